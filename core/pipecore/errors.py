@@ -1,0 +1,32 @@
+"""Errors that pipecore raises for reasons its caller can do something about."""
+
+
+class PipecoreError(Exception):
+    """Base of all errors that pipecore raises on purpose.
+
+    The message is one sentence for the person at the screen: what happened, to
+    which file or setting, and what to do.
+    """
+
+
+class ReadError(PipecoreError):
+    """A file could not be read as a point cloud."""
+
+
+class WriteError(PipecoreError):
+    """A file or report could not be written; nothing was left half done."""
+
+
+class SettingsError(PipecoreError):
+    """A setting is unknown, of the wrong kind or outside its bounds."""
+
+
+class SceneError(PipecoreError):
+    """A description of a scene for the simulator is not valid."""
+
+
+class CancelledError(PipecoreError):
+    """The user cancelled the work."""
+
+    def __init__(self, message: str = "Cancelled.") -> None:
+        super().__init__(message)

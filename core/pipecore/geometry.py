@@ -1,0 +1,249 @@
+"""Axes in space: a straight line or a circular arc, with chainage and clock position.
+
+Every element of a pipe run has an axis. An axis maps points in space to *pipe
+coordinates* (chainage, distance from the axis, clock angle) and back. See
+``docs/conventions.md`` for the sign and direction of each.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+VERTICAL_COS = np.cos(np.deg2rad(15.0))
+"""An axis within 15 degrees of the vertical counts as vertical: its 12:00 is grid north."""
+
+
+def unit(vector: ArrayLike) -> Array:
+    """Return `vector` scaled to length one."""
+    v = np.asarray(vector, dtype=np.float64)
+    return v / np.linalg.norm(v)
+
+
+def twelve_o_clock(tangent: Array) -> Array:
+    """Return the unit vector across `tangent` (shape (3,), unit) that points to 12:00.
+
+    Up (+Z) made perpendicular to the tangent; grid north (+Y) for a vertical tangent.
+    """
+    reference = np.array([0.0, 1.0, 0.0] if abs(tangent[2]) > VERTICAL_COS else [0.0, 0.0, 1.0])
+    return unit(reference - (reference @ tangent) * tangent)
+
+
+class Axis(Protocol):
+    """What a line and an arc have in common. Lengths in metres, angles in radians."""
+
+    @property
+    def length(self) -> float:
+        """Length along the axis."""
+        ...
+
+    @property
+    def start(self) -> Array:
+        """Point at chainage zero, shape (3,)."""
+        ...
+
+    @property
+    def end(self) -> Array:
+        """Point at the end, shape (3,)."""
+        ...
+
+    def at(self, chainage: ArrayLike) -> Array:
+        """Points on the axis at `chainage` (shape (n,) or scalar), shape (n, 3) or (3,)."""
+        ...
+
+    def tangent(self, chainage: ArrayLike) -> Array:
+        """Unit tangents towards increasing chainage, shape (n, 3) or (3,)."""
+        ...
+
+    def frame(self, chainage: ArrayLike) -> tuple[Array, Array]:
+        """Unit vectors to 12:00 and to 3:00 at `chainage`, each (n, 3) or (3,)."""
+        ...
+
+    def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
+        """Chainage, distance from the axis and clock angle of `points` (n, 3), each (n,).
+
+        The chainage may lie outside 0 … length. Clock angles are in 0 … 2π.
+        """
+        ...
+
+    def reversed(self) -> "Axis":
+        """The same axis with chainage counted from its other end."""
+        ...
+
+
+def surface_points(axis: Axis, chainage: ArrayLike, radius: ArrayLike, clock: ArrayLike) -> Array:
+    """Points at pipe coordinates; the inverse of `Axis.pipe_coordinates`.
+
+    Parameters
+    ----------
+    axis : Axis
+    chainage, radius, clock : array_like
+        Metres, metres and radians; one-dimensional or scalar, broadcast against each other.
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 3), or (3,) for scalars.
+    """
+    chainage, radius, clock = np.broadcast_arrays(chainage, radius, clock)
+    up, right = axis.frame(chainage)
+    across = np.cos(clock)[..., None] * up + np.sin(clock)[..., None] * right
+    return np.asarray(axis.at(chainage) + np.asarray(radius)[..., None] * across)
+
+
+def _polar(up_part: Array, right_part: Array) -> tuple[Array, Array]:
+    return np.hypot(up_part, right_part), np.mod(np.arctan2(right_part, up_part), 2 * np.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class LineAxis:
+    """A straight axis from `start` along the unit vector `direction` for `length` metres."""
+
+    start: Array
+    direction: Array
+    length: float
+
+    @classmethod
+    def between(cls, start: ArrayLike, end: ArrayLike) -> "LineAxis":
+        """Return the axis from one point to another."""
+        a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        return cls(a, unit(b - a), float(np.linalg.norm(b - a)))
+
+    @property
+    def end(self) -> Array:
+        """Point at the end, shape (3,)."""
+        return self.at(self.length)
+
+    def at(self, chainage: ArrayLike) -> Array:
+        """Points on the axis at `chainage`."""
+        return np.asarray(self.start + np.asarray(chainage)[..., None] * self.direction)
+
+    def tangent(self, chainage: ArrayLike) -> Array:
+        """Unit tangents at `chainage`."""
+        return np.broadcast_to(self.direction, (*np.shape(chainage), 3))
+
+    @cached_property
+    def _up_right(self) -> tuple[Array, Array]:
+        up = twelve_o_clock(self.direction)
+        return up, np.cross(self.direction, up)
+
+    def frame(self, chainage: ArrayLike) -> tuple[Array, Array]:
+        """Unit vectors to 12:00 and 3:00 at `chainage`."""
+        shape = (*np.shape(chainage), 3)
+        up, right = self._up_right
+        return np.broadcast_to(up, shape), np.broadcast_to(right, shape)
+
+    def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
+        """Chainage, distance and clock angle of `points` (n, 3)."""
+        up, right = self._up_right
+        offset = np.asarray(points, dtype=np.float64) - self.start
+        return (offset @ self.direction, *_polar(offset @ up, offset @ right))
+
+    def reversed(self) -> "LineAxis":
+        """The same axis from its other end."""
+        return LineAxis(self.end, -self.direction, self.length)
+
+
+@dataclass(frozen=True, eq=False)
+class ArcAxis:
+    """A circular axis, as a bend has it.
+
+    Parameters
+    ----------
+    centre : ndarray
+        Centre of the arc, shape (3,).
+    normal : ndarray
+        Unit normal of the arc's plane; chainage increases counter-clockwise about it.
+    towards_start : ndarray
+        Unit vector from the centre to the start, across `normal`.
+    bend_radius : float
+        Radius of the arc in metres.
+    bend_angle : float
+        Angle of the arc in radians, 0 to 2π.
+    """
+
+    centre: Array
+    normal: Array
+    towards_start: Array
+    bend_radius: float
+    bend_angle: float
+
+    @property
+    def length(self) -> float:
+        """Length along the arc."""
+        return self.bend_radius * self.bend_angle
+
+    @property
+    def start(self) -> Array:
+        """Point at chainage zero."""
+        return self.centre + self.bend_radius * self.towards_start
+
+    @property
+    def end(self) -> Array:
+        """Point at the end."""
+        return self.at(self.length)
+
+    @cached_property
+    def _ahead_at_start(self) -> Array:
+        return np.cross(self.normal, self.towards_start)
+
+    def _outward(self, chainage: ArrayLike) -> Array:
+        angle = np.asarray(chainage)[..., None] / self.bend_radius
+        return np.asarray(np.cos(angle) * self.towards_start + np.sin(angle) * self._ahead_at_start)
+
+    def at(self, chainage: ArrayLike) -> Array:
+        """Points on the axis at `chainage`."""
+        return self.centre + self.bend_radius * self._outward(chainage)
+
+    def tangent(self, chainage: ArrayLike) -> Array:
+        """Unit tangents at `chainage`."""
+        return np.cross(self.normal, self._outward(chainage))
+
+    @cached_property
+    def _clock_of_outward(self) -> float:
+        """Clock angle of the extrados, the same all along the bend.
+
+        12:00 is found at the middle of the bend and carried along, so that a clock
+        position keeps its meaning (intrados, extrados, side) through the bend.
+        """
+        middle = self.length / 2
+        tangent, outward = self.tangent(middle), self._outward(middle)
+        up = twelve_o_clock(tangent)
+        return float(np.arctan2(outward @ np.cross(tangent, up), outward @ up))
+
+    def frame(self, chainage: ArrayLike) -> tuple[Array, Array]:
+        """Unit vectors to 12:00 and 3:00 at `chainage`."""
+        outward = self._outward(chainage)
+        # Clockwise of `outward`, seen along t = normal × outward, lies t × outward = -normal.
+        cos, sin = np.cos(self._clock_of_outward), np.sin(self._clock_of_outward)
+        return cos * outward + sin * self.normal, sin * outward - cos * self.normal
+
+    def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
+        """Chainage, distance and clock angle of `points` (n, 3)."""
+        offset = np.asarray(points, dtype=np.float64) - self.centre
+        along_start, along_ahead = offset @ self.towards_start, offset @ self._ahead_at_start
+        # The cut of the circle is put opposite the middle of the arc.
+        half = self.bend_angle / 2
+        angle = np.arctan2(along_ahead, along_start) - half
+        angle = half + np.mod(angle + np.pi, 2 * np.pi) - np.pi
+        outward_part = np.hypot(along_start, along_ahead) - self.bend_radius
+        side_part = -(offset @ self.normal)
+        cos, sin = np.cos(self._clock_of_outward), np.sin(self._clock_of_outward)
+        rho, clock = _polar(
+            cos * outward_part - sin * side_part, sin * outward_part + cos * side_part
+        )
+        return angle * self.bend_radius, rho, clock
+
+    def reversed(self) -> "ArcAxis":
+        """The same axis from its other end."""
+        return ArcAxis(
+            self.centre,
+            -self.normal,
+            self._outward(self.length),
+            self.bend_radius,
+            self.bend_angle,
+        )

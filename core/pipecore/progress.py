@@ -1,0 +1,33 @@
+"""How long work tells its caller how far it is, and learns that it should stop."""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+
+class Progress(Protocol):
+    """Told by every stage how far it is; may stop the work by raising.
+
+    Stages call `update` at least twice a second. An implementation that wants the
+    work to stop raises `pipecore.errors.CancelledError` from it.
+    """
+
+    def update(self, stage: str, fraction: float) -> None:
+        """Take note that `stage` (a short lower-case noun) is done to `fraction` (0 to 1)."""
+        ...
+
+
+class NoProgress:
+    """The progress nobody looks at."""
+
+    def update(self, stage: str, fraction: float) -> None:
+        """Do nothing."""
+
+
+def in_chunks(
+    n_items: int, chunk_size: int, stage: str, progress: Progress
+) -> Iterator[tuple[int, int]]:
+    """Yield (start, stop) over `n_items`, reporting to `progress` around every chunk."""
+    for start in range(0, n_items, chunk_size):
+        progress.update(stage, start / n_items)
+        yield start, min(start + chunk_size, n_items)
+    progress.update(stage, 1.0)

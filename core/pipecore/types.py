@@ -1,0 +1,398 @@
+"""The nouns of the pipeline: cloud, stack, profile, element, deformation, result.
+
+All lengths are metres and all angles radians unless a name says otherwise. Geometry
+is in *local* coordinates: world coordinates less the cloud's `origin`. Quantities
+that the scan cannot carry are nan, never a guess.
+"""
+
+from dataclasses import dataclass, field, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.settings import Settings
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32] | NDArray[np.float64]
+
+NO_ID = 0
+"""The id of "none": ids of stacks, segments, elements, runs and deformations start at 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points of one or several scans in one coordinate system.
+
+    Parameters
+    ----------
+    origin : ndarray
+        World coordinates of the local zero, float64, shape (3,).
+    xyz : ndarray
+        Local coordinates, shape (n, 3), C-contiguous; float32 where that keeps 0.1 mm
+        (extents up to a kilometre), else float64. All finite.
+    intensity : ndarray, optional
+        As in the file, float32, shape (n,).
+    rgb : ndarray, optional
+        uint8, shape (n, 3).
+    classification : ndarray, optional
+        ASPRS classes, uint8, shape (n,).
+    stations : ndarray
+        Scanner positions in local coordinates where the file knows them, shape (k, 3).
+    crs : str
+        The coordinate reference system's name, or "".
+    source : Path, optional
+        The file it was read from.
+    """
+
+    origin: Array
+    xyz: Floats
+    intensity: NDArray[np.float32] | None = None
+    rgb: NDArray[np.uint8] | None = None
+    classification: NDArray[np.uint8] | None = None
+    stations: Array = field(default_factory=lambda: np.empty((0, 3)))
+    crs: str = ""
+    source: Path | None = None
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.xyz)
+
+    def world(self, local: Array) -> Array:
+        """World coordinates (float64) of local ones, any shape (..., 3)."""
+        return np.asarray(local, dtype=np.float64) + self.origin
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """All parallel profiles of one direction (paper, section 3.1).
+
+    Profile `i` holds the points whose distance along `direction` from the local zero
+    lies in [offset + i·width, offset + (i + 1)·width).
+    """
+
+    stack_id: int
+    direction: Array
+    width: float
+    offset: float = 0.0
+    name: str = ""
+
+    def profile_index(self, xyz: Floats) -> NDArray[np.int32]:
+        """Index of the profile that each point of `xyz` (n, 3) falls into."""
+        along = np.asarray(xyz, dtype=np.float64) @ self.direction
+        return np.floor((along - self.offset) / self.width).astype(np.int32)
+
+
+class ElementKind(StrEnum):
+    """What an element is; the values are those of the report."""
+
+    CYLINDER = "cylinder"
+    CONE = "cone"
+    SPHERE = "sphere"
+    TORUS = "torus"
+    FLANGE = "flange"
+    TEE = "tee"
+    OTHER = "other"
+
+
+@dataclass(frozen=True)
+class NominalSize:
+    """A catalogue size: its name (such as "DN 150 / NPS 6") and outside diameter in metres."""
+
+    name: str
+    outside_diameter: float
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """One piece of a pipe run with one kind of surface about one axis.
+
+    Parameters
+    ----------
+    element_id, run_id : int
+    kind : ElementKind
+    axis : LineAxis or ArcAxis
+        As scanned: it starts and ends where the points do. A sphere's axis is the
+        straight line along which its profiles were cut; see `centre`.
+    radius, radius_sd : float
+        Radius (at the start for a cone) and its standard deviation, metres.
+    radius_end : float
+        Radius at the end of a cone; equal to `radius` for the other kinds.
+    centre : ndarray
+        Centre of a sphere or of a torus's bend, shape (3,); nan for the other kinds.
+    n_points, n_profiles : int
+        Points of the full cloud on it; profiles with an accepted ellipse.
+    arc : float
+        Median arc around the axis that its profiles see, radians.
+    rms : float
+        Root mean square of the points' distances from the fitted surface, metres.
+    ovality, ovality_sd : float
+        (Dmax - Dmin) / Dnom as a ratio; nan where the arc cannot carry it.
+    straightness : float
+        Largest distance of the measured axis from the fitted one, metres.
+    nominal : NominalSize, optional
+        The catalogue size within tolerance, if any.
+    gaps : tuple of (float, float)
+        Chainage ranges without profiles (paper, figure 11).
+    """
+
+    element_id: int
+    run_id: int
+    kind: ElementKind
+    axis: LineAxis | ArcAxis
+    radius: float
+    radius_sd: float
+    radius_end: float
+    centre: Array
+    n_points: int
+    n_profiles: int
+    arc: float
+    rms: float
+    ovality: float = np.nan
+    ovality_sd: float = np.nan
+    straightness: float = np.nan
+    nominal: NominalSize | None = None
+    gaps: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """What people call it, such as "Pipe 3" or "Bend 4"."""
+        return f"{_SPOKEN_KIND[self.kind]} {self.element_id}"
+
+    def radius_at(self, chainage: Array | float) -> Array:
+        """Radius of the fitted surface about the axis at `chainage`, metres."""
+        s = np.asarray(chainage, dtype=np.float64)
+        if self.kind is ElementKind.SPHERE:
+            along = (self.centre - self.axis.start) @ self.axis.tangent(0.0)
+            return np.sqrt(np.maximum(self.radius**2 - (s - along) ** 2, 0.0))
+        slope = (self.radius_end - self.radius) / self.axis.length
+        return np.asarray(self.radius + slope * s)
+
+
+_SPOKEN_KIND = {
+    ElementKind.CYLINDER: "Pipe",
+    ElementKind.CONE: "Reducer",
+    ElementKind.SPHERE: "Sphere",
+    ElementKind.TORUS: "Bend",
+    ElementKind.FLANGE: "Flange",
+    ElementKind.TEE: "Tee",
+    ElementKind.OTHER: "Element",
+}
+
+
+OWN_STACK = 0
+"""`Profiles.stack_id` of profiles cut across an element's own axis in the refinement."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profiles:
+    """The profiles of all elements with their ellipses: a table, one array per column.
+
+    Rows of one element and stack are in order of `chainage`.
+
+    Parameters
+    ----------
+    element_id, stack_id, profile_index : ndarray of int32, shape (m,)
+        `stack_id` is `OWN_STACK` for profiles cut across the element's own axis; the
+        index then counts from the start of the element.
+    chainage : ndarray, shape (m,)
+    centre : ndarray, shape (m, 3)
+        Centre of the ellipse.
+    normal, major_direction : ndarray, shape (m, 3)
+        Unit normal of the profile's plane; unit vector along the major axis, in the plane.
+    semi_minor, semi_major : ndarray, shape (m,)
+        Of the ellipse fitted freely where the arc carries it, else of the constrained one.
+    radius, radius_sd : ndarray, shape (m,)
+        Of the circle seen along the axis, and its standard deviation.
+    ovality : ndarray, shape (m,)
+        (Dmax - Dmin) / Dnom of this profile as a ratio, nan where not measurable.
+    centre_deviation, radius_deviation : ndarray, shape (m,)
+        Distance of the centre from the element's axis; radius less the element's radius.
+    arc : ndarray, shape (m,)
+        Arc that the points cover, radians.
+    n_points : ndarray of int32, shape (m,)
+    rms : ndarray, shape (m,)
+    aic_line, aic_ellipse : ndarray, shape (m,)
+        Equation 4 of the paper for either model.
+    """
+
+    element_id: NDArray[np.int32]
+    stack_id: NDArray[np.int32]
+    profile_index: NDArray[np.int32]
+    chainage: Array
+    centre: Array
+    normal: Array
+    major_direction: Array
+    semi_minor: Array
+    semi_major: Array
+    radius: Array
+    radius_sd: Array
+    ovality: Array
+    centre_deviation: Array
+    radius_deviation: Array
+    arc: Array
+    n_points: NDArray[np.int32]
+    rms: Array
+    aic_line: Array
+    aic_ellipse: Array
+
+    def __len__(self) -> int:
+        """Return the number of profiles."""
+        return len(self.element_id)
+
+    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.intp] | slice) -> "Profiles":
+        """Return the given rows as a table."""
+        return Profiles(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    @property
+    def flattening(self) -> Array:
+        """1 - semi-minor / semi-major (paper, section 3.3.1)."""
+        return 1.0 - self.semi_minor / self.semi_major
+
+    def of_element(self, element_id: int, stack_id: int | None = None) -> "Profiles":
+        """Return the rows of one element, of one stack if given."""
+        rows = self.element_id == element_id
+        if stack_id is not None:
+            rows &= self.stack_id == stack_id
+        return self[rows]
+
+    @classmethod
+    def concatenate(cls, tables: "list[Profiles]") -> "Profiles":
+        """Return one table with the rows of all."""
+        if not tables:
+            return cls.empty()
+        return cls(*(np.concatenate([getattr(t, f.name) for t in tables]) for f in fields(cls)))
+
+    @classmethod
+    def empty(cls) -> "Profiles":
+        """Return a table without rows."""
+        shapes: dict[str, Any] = {f.name: np.empty(0) for f in fields(cls)}
+        shapes |= {name: np.empty((0, 3)) for name in ("centre", "normal", "major_direction")}
+        for name in ("element_id", "stack_id", "profile_index", "n_points"):
+            shapes[name] = np.empty(0, np.int32)
+        return cls(**shapes)
+
+
+class DeformationKind(StrEnum):
+    """What a deformation is; the values are those of the report."""
+
+    DENT = "dent"
+    BULGE = "bulge"
+    OVALITY = "ovality"
+    BOW = "bow"
+    KINK = "kink"
+
+
+class Verdict(StrEnum):
+    """What the chosen rule says of a deformation; the values are those of the report."""
+
+    ACCEPT = "accept"
+    REVIEW = "review"
+    REJECT = "reject"
+    NOT_MEASURABLE = "not measurable"
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """A place where an element leaves its shape.
+
+    Parameters
+    ----------
+    deformation_id, element_id : int
+    kind : DeformationKind
+    chainage, chainage_start, chainage_end : float
+        Of the peak and of the extent, metres from the element's start.
+    clock : float
+        Clock angle of the peak, radians, 0 = 12:00, clockwise looking along the chainage.
+    peak : ndarray
+        The peak on the surface, shape (3,).
+    depth, depth_sd : float
+        Magnitude (outward for a bulge) against the undented contour, metres.
+    length, width : float
+        Extent along the axis and around the circumference, metres.
+    ovality, strain : float
+        As ratios; nan where they do not apply or cannot be measured.
+    n_points : int
+    rule : str
+        Name of the rule that gave the verdict.
+    verdict : Verdict
+    significance : float
+        Depth in units of its own noise.
+    """
+
+    deformation_id: int
+    element_id: int
+    kind: DeformationKind
+    chainage: float
+    chainage_start: float
+    chainage_end: float
+    clock: float
+    peak: Array
+    depth: float
+    depth_sd: float
+    length: float
+    width: float
+    ovality: float = np.nan
+    strain: float = np.nan
+    n_points: int = 0
+    rule: str = ""
+    verdict: Verdict = Verdict.NOT_MEASURABLE
+    significance: float = np.nan
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What a detection found, with the settings that made it.
+
+    Per-point arrays follow the order of the cloud's points.
+
+    Parameters
+    ----------
+    settings : Settings
+    origin : ndarray
+        World coordinates of the local zero, shape (3,).
+    source : Path, optional
+    n_cloud_points : int
+    stacks : tuple of Stack
+        In the order of their ids.
+    elements : tuple of Element
+        In the order of their ids.
+    profiles : Profiles
+    deformations : tuple of Deformation
+        In the order of their ids.
+    segment_id, element_id : ndarray of int32, shape (n,)
+        `NO_ID` for points of none.
+    deviation : ndarray of float32, shape (n,)
+        Signed radial distance from the element's reference contour, metres, outward
+        positive; nan for points of none.
+    seconds : dict
+        Time spent per step.
+    """
+
+    settings: Settings
+    origin: Array
+    source: Path | None
+    n_cloud_points: int
+    stacks: tuple[Stack, ...]
+    elements: tuple[Element, ...]
+    profiles: Profiles
+    deformations: tuple[Deformation, ...]
+    segment_id: NDArray[np.int32]
+    element_id: NDArray[np.int32]
+    deviation: NDArray[np.float32]
+    seconds: dict[str, float]
+
+    def element(self, element_id: int) -> Element:
+        """Return the element with this id."""
+        return self.elements[element_id - 1]
+
+    def deformation(self, deformation_id: int) -> Deformation:
+        """Return the deformation with this id."""
+        return self.deformations[deformation_id - 1]
+
+    def deformations_of(self, element_id: int) -> tuple[Deformation, ...]:
+        """Return the deformations of one element."""
+        return tuple(d for d in self.deformations if d.element_id == element_id)

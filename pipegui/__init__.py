@@ -1,0 +1,1 @@
+"""The desktop program: shows what pipecore finds, computes nothing of its own."""

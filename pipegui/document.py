@@ -1,0 +1,102 @@
+"""What the user works on: scans, results, selection and view options, all immutable.
+
+A command takes a `Document` and returns the next one; undo is going back to an
+earlier one. Nothing here knows Qt or VTK.
+"""
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from pipecore.settings import Settings
+from pipecore.types import NO_ID, PointCloud, Result
+
+
+class ColourBy(StrEnum):
+    """What the points' colour means."""
+
+    SEGMENT = "Segment"
+    ELEMENT = "Element"
+    KIND = "Kind"
+    DEVIATION = "Deviation"
+    HEIGHT = "Height"
+    INTENSITY = "Intensity"
+    RGB = "RGB"
+    PROFILE = "Profiles of a stack"
+
+
+@dataclass(frozen=True)
+class ProfileKey:
+    """One profile of the selected element."""
+
+    stack_id: int
+    profile_index: int
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The one thing that is selected, with what contains it.
+
+    A selected profile or deformation implies its element; a selected element its run.
+    """
+
+    run_id: int = NO_ID
+    element_id: int = NO_ID
+    deformation_id: int = NO_ID
+    profile: ProfileKey | None = None
+
+    def parent(self) -> "Selection":
+        """What Esc goes to: profile → deformation → element → run → nothing."""
+        if self.profile is not None:
+            return replace(self, profile=None)
+        if self.deformation_id:
+            return replace(self, deformation_id=NO_ID)
+        if self.element_id:
+            return replace(self, element_id=NO_ID)
+        return Selection()
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """How things are shown."""
+
+    colour_by: ColourBy = ColourBy.RGB
+    deviation_limit_mm: float = 10.0
+    hidden_elements: frozenset[int] = frozenset()
+    show_points: bool = True
+    show_axes: bool = True
+    show_ellipses: bool = False
+    show_surfaces: bool = False
+    show_labels: bool = True
+    shown_stack: int = NO_ID
+    """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
+    fly: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A cloud with the result of its last detection, if any."""
+
+    name: str
+    cloud: PointCloud
+    result: Result | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """All of the user's work."""
+
+    scans: tuple[Scan, ...] = ()
+    active: int = 0
+    settings: Settings = field(default_factory=Settings)
+    selection: Selection = Selection()
+    view: ViewOptions = ViewOptions()
+
+    @property
+    def scan(self) -> Scan | None:
+        """The scan that is looked at."""
+        return self.scans[self.active] if self.scans else None
+
+    @property
+    def result(self) -> Result | None:
+        """The result that is looked at."""
+        return self.scan.result if self.scan else None
