@@ -1,0 +1,62 @@
+# Each target first brings what it needs: system packages (Debian, Ubuntu) and the environment .venv.
+
+VENV := .venv
+PYTHON := $(VENV)/bin/python
+STAMP := $(VENV)/.installed
+DEMO := resources/demo/demo.laz
+
+# A window needs a display; where there is none, a virtual one is made for the command.
+ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
+WINDOWED := xvfb-run -a -s "-screen 0 1600x1000x24"
+endif
+
+MAKEFLAGS += --no-print-directory
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint test-core test-kernels test-gui format lock venv system-packages clean
+
+help: ## Show this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
+
+demo: venv ## Find the deformations in the demo scan and look at them in the app
+	@installer/demo.sh $(DEMO) out/demo
+
+test: lint test-core test-kernels test-gui ## Run every check and every test
+
+lint: venv ## Check style, types and the rules of who may import whom
+	$(VENV)/bin/ruff check
+	$(VENV)/bin/ruff format --check
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports --no-logo
+
+# Without the Qt plugin, so that the core is seen to do without Qt.
+test-core: venv
+	$(PYTHON) -m pytest -p no:pytest-qt tests/core
+
+# The twins once more with the kernels as plain Python: what the compiler is not asked to do
+# here must come out the same, and an index beyond an array's end raises.
+test-kernels: venv
+	NUMBA_DISABLE_JIT=1 $(PYTHON) -m pytest -p no:pytest-qt -m kernels tests/core
+
+test-gui: venv
+	$(WINDOWED) $(PYTHON) -m pytest tests/gui
+
+format: venv ## Lay out the code and mend what can be mended
+	$(VENV)/bin/ruff check --fix
+	$(VENV)/bin/ruff format
+
+lock: ## Bring requirements.lock up to what pyproject.toml asks for (needs uv)
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+	    --custom-compile-command "make lock" --extra dev pyproject.toml -o requirements.lock
+
+venv: $(STAMP) ## Make or renew the environment .venv
+
+$(STAMP): requirements.lock pyproject.toml installer/environment.sh | system-packages
+	@installer/environment.sh
+	@touch $@
+
+system-packages:
+	@installer/system-packages.sh
+
+clean: ## Remove everything that was made here, but for the environment
+	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	find core pipegui tests -name __pycache__ -prune -exec rm -rf {} +
