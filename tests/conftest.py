@@ -1,4 +1,4 @@
-"""Fixtures that all tests share: random seeds that can be repeated, and the folder of real scans."""
+"""Fixtures that all tests share: seeds that can be repeated, and the folder of real scans."""
 
 import hashlib
 import os
@@ -42,7 +42,7 @@ def _how_to_repeat(config: pytest.Config) -> str:
 
 @pytest.fixture
 def seed(request: pytest.FixtureRequest) -> int:
-    """A seed of this test's own: another in each session, the same whichever tests run beside it."""
+    """A seed of this test alone: new in each session, the same whatever runs beside it."""
     text = f"{request.config.stash[SESSION_SEED]} {request.node.nodeid}"
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
 
