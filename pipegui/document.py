@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from pipecore.settings import Settings
-from pipecore.types import NO_ID, PointCloud, Result
+from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result
 
 
 class ColourBy(StrEnum):
@@ -69,6 +69,8 @@ class ViewOptions:
     show_labels: bool = True
     shown_stack: int = NO_ID
     """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
+    plot_stack: int = OWN_STACK
+    """The stack that the radius plot shows while no profile is selected."""
     fly: bool = True
 
 

@@ -1,0 +1,423 @@
+"""What each part of the window shows: `resolve` turns a document into frozen states.
+
+One class per consumer. A consumer's state equals the one before if nothing that it
+shows has changed; then nobody bothers the consumer. Arrays, clouds and results are
+compared by identity, so cuts out of a result are made once and kept.
+Nothing here knows Qt or VTK.
+"""
+
+from dataclasses import dataclass, field, fields
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.geometry import twelve_o_clock
+from pipecore.settings import Settings, StackSettings
+from pipecore.types import (
+    NO_ID,
+    OWN_STACK,
+    Deformation,
+    Element,
+    PointCloud,
+    Profiles,
+    Result,
+    Stack,
+)
+from pipegui.document import Document, ProfileKey, Scan, Selection, ViewOptions
+
+Array = NDArray[np.float64]
+
+NO_PROFILES = Profiles.empty()
+NOTHING = np.empty(0)
+NO_POINTS_UV = np.empty((0, 2))
+
+
+class _ComparedByParts:
+    """Equality that takes arrays by identity and everything else by value."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return False
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))  # type: ignore[arg-type]
+        return all(a is b or (not isinstance(a, np.ndarray) and a == b) for a, b in pairs)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
+
+@dataclass(frozen=True, eq=False)
+class SceneState(_ComparedByParts):
+    """The parts of the document that the 3D view shows.
+
+    `scan_key` differs between scans: a new one is fitted into the view. `profile` is
+    the selected profile as a table of one row, or None.
+    """
+
+    scan_key: str = ""
+    cloud: PointCloud | None = None
+    result: Result | None = None
+    selection: Selection = Selection()
+    view: ViewOptions = ViewOptions()
+    profile: Profiles | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class RadiusPlotState(_ComparedByParts):
+    """The radius-against-profile plot of the selected element.
+
+    Parameters
+    ----------
+    element : Element, optional
+    profiles : Profiles
+        All rows of the element, of every stack; see `shown`.
+    stack_id : int
+        The stack whose profiles are plotted.
+    stacks : tuple of (int, str, int)
+        Id, name and number of profiles of the stacks to choose from.
+    selected_index : int, optional
+        `profile_index` of the selected profile, if it is of this stack.
+    deformations : tuple of Deformation
+        Those of the element.
+    selected_deformation : int
+    """
+
+    element: Element | None = None
+    profiles: Profiles = NO_PROFILES
+    stack_id: int = OWN_STACK
+    stacks: tuple[tuple[int, str, int], ...] = ()
+    selected_index: int | None = None
+    deformations: tuple[Deformation, ...] = ()
+    selected_deformation: int = NO_ID
+
+    @property
+    def shown(self) -> Profiles:
+        """The rows of the chosen stack, in order of chainage."""
+        return self.profiles[self.profiles.stack_id == self.stack_id]
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipse:
+    """An ellipse in a profile's plane: millimetres, u to 3:00, v to 12:00."""
+
+    centre_uv: tuple[float, float]
+    semi_major_mm: float
+    semi_minor_mm: float
+    angle_rad: float
+    """Of the major axis, counter-clockwise from u."""
+
+
+@dataclass(frozen=True, eq=False)
+class SectionState(_ComparedByParts):
+    """The section view of the selected profile.
+
+    Parameters
+    ----------
+    element : Element, optional
+    profile : Profiles, optional
+        A table of one row, or None if no profile is selected.
+    points_uv : ndarray, shape (n, 2)
+        The profile's points in its plane relative to the centre of its ellipse,
+        millimetres; u points to 3:00 and v to 12:00, looking along the chainage.
+    fitted : Ellipse, optional
+        The profile's own ellipse.
+    reference : Ellipse, optional
+        The element's undeformed contour in this plane.
+    position, count : int
+        This is profile `position` (from 1) of `count` in its stack.
+    stack_name : str
+    deformations : tuple of Deformation
+        Those that the profile passes through.
+    """
+
+    element: Element | None = None
+    profile: Profiles | None = None
+    points_uv: Array = field(default_factory=lambda: NO_POINTS_UV)
+    fitted: Ellipse | None = None
+    reference: Ellipse | None = None
+    position: int = 0
+    count: int = 0
+    stack_name: str = ""
+    deformations: tuple[Deformation, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MapState(_ComparedByParts):
+    """The unrolled deviation map of the selected element.
+
+    `chainage` (metres), `clock` (radians, 0 … 2π) and `deviation` (metres, outward
+    positive) belong to the element's points, shape (n,).
+    """
+
+    element: Element | None = None
+    chainage: Array = field(default_factory=lambda: NOTHING)
+    clock: Array = field(default_factory=lambda: NOTHING)
+    deviation: Array = field(default_factory=lambda: NOTHING)
+    deformations: tuple[Deformation, ...] = ()
+    selected_deformation: int = NO_ID
+    selected_chainage: float | None = None
+    """Of the selected profile."""
+    limit_mm: float = 10.0
+    """The colours span ± this."""
+
+
+@dataclass(frozen=True)
+class TreeState:
+    """The project tree."""
+
+    scans: tuple[Scan, ...] = ()
+    active: int = 0
+    selection: Selection = Selection()
+    hidden_elements: frozenset[int] = frozenset()
+
+
+@dataclass(frozen=True)
+class StacksState:
+    """The stacks panel: what to cut next, and what the last detection cut."""
+
+    settings: StackSettings = StackSettings()
+    stacks: tuple[Stack, ...] = ()
+    n_profiles: tuple[int, ...] = ()
+    """Profiles with an accepted ellipse, per stack."""
+    shown_stack: int = NO_ID
+
+
+@dataclass(frozen=True)
+class TableState:
+    """The deformation table."""
+
+    result: Result | None = None
+    selected: int = NO_ID
+
+
+@dataclass(frozen=True)
+class PropertiesState:
+    """The properties of the selection."""
+
+    scan: Scan | None = None
+    selection: Selection = Selection()
+    profile: Profiles | None = None
+
+
+@dataclass(frozen=True)
+class WindowState:
+    """Title, status bar and which actions make sense."""
+
+    scan: Scan | None = None
+    view: ViewOptions = ViewOptions()
+    has_selection: bool = False
+
+
+@dataclass(frozen=True)
+class ViewState:
+    """Everything that the window shows."""
+
+    window: WindowState = WindowState()
+    scene: SceneState = SceneState()
+    tree: TreeState = TreeState()
+    stacks: StacksState = StacksState()
+    settings: Settings = Settings()
+    table: TableState = TableState()
+    properties: PropertiesState = PropertiesState()
+    radius_plot: RadiusPlotState = RadiusPlotState()
+    section: SectionState = SectionState()
+    map: MapState = MapState()
+
+
+def resolve(document: Document) -> ViewState:
+    """Return what each part of the window shows for `document`."""
+    scan, result = document.scan, document.result
+    selection, view = document.selection, document.view
+    profile = None
+    if result is not None and selection.profile is not None:
+        profile = _profile(result, selection.element_id, selection.profile)
+    return ViewState(
+        window=WindowState(scan, view, selection != Selection()),
+        scene=SceneState(
+            scan_key=f"{document.active}:{scan.name}" if scan else "",
+            cloud=scan.cloud if scan else None,
+            result=result,
+            selection=selection,
+            view=view,
+            profile=profile,
+        ),
+        tree=TreeState(document.scans, document.active, selection, view.hidden_elements),
+        stacks=StacksState(
+            document.settings.stacks,
+            result.stacks if result else (),
+            _profiles_per_stack(result) if result else (),
+            view.shown_stack,
+        ),
+        settings=document.settings,
+        table=TableState(result, selection.deformation_id),
+        properties=PropertiesState(scan, selection, profile),
+        **_element_states(scan, selection, view, profile),
+    )
+
+
+def _element_states(
+    scan: Scan | None, selection: Selection, view: ViewOptions, profile: Profiles | None
+) -> dict:
+    """States of the three views of the selected element."""
+    if scan is None or scan.result is None or not selection.element_id:
+        return {}
+    result = scan.result
+    element = result.element(selection.element_id)
+    deformations = _deformations(result, element.element_id)
+    stack_id = selection.profile.stack_id if selection.profile else view.plot_stack
+    choices = _stack_choices(result, element.element_id)
+    if stack_id not in {choice[0] for choice in choices}:
+        stack_id = choices[0][0] if choices else OWN_STACK
+    radius_plot = RadiusPlotState(
+        element=element,
+        profiles=_profiles(result, element.element_id),
+        stack_id=stack_id,
+        stacks=choices,
+        selected_index=selection.profile.profile_index if selection.profile else None,
+        deformations=deformations,
+        selected_deformation=selection.deformation_id,
+    )
+    if profile is None:
+        section = SectionState(element=element)
+    else:
+        section = _section(scan.cloud, result, element.element_id, selection.profile)
+    chainage, clock, deviation, _ = _surface(scan.cloud, result, element.element_id)
+    deviation_map = MapState(
+        element=element,
+        chainage=chainage,
+        clock=clock,
+        deviation=deviation,
+        deformations=deformations,
+        selected_deformation=selection.deformation_id,
+        selected_chainage=None if profile is None else float(profile.chainage[0]),
+        limit_mm=view.deviation_limit_mm,
+    )
+    return {"radius_plot": radius_plot, "section": section, "map": deviation_map}
+
+
+# Cuts out of a result. Kept for the few elements last looked at, because equality
+# of the states stands on their identity; results themselves live in the history.
+
+
+@lru_cache(maxsize=8)
+def _profiles_per_stack(result: Result) -> tuple[int, ...]:
+    return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
+
+
+@lru_cache(maxsize=32)
+def _deformations(result: Result, element_id: int) -> tuple[Deformation, ...]:
+    return result.deformations_of(element_id)
+
+
+@lru_cache(maxsize=32)
+def _profiles(result: Result, element_id: int) -> Profiles:
+    return result.profiles.of_element(element_id)
+
+
+@lru_cache(maxsize=32)
+def _profile(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
+    rows = _profiles(result, element_id)
+    row = (rows.stack_id == key.stack_id) & (rows.profile_index == key.profile_index)
+    return rows[np.flatnonzero(row)[:1]] if row.any() else None
+
+
+@lru_cache(maxsize=32)
+def _stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
+    """Stacks with profiles of this element: its own first, then by number of profiles."""
+    ids, counts = np.unique(_profiles(result, element_id).stack_id, return_counts=True)
+    choices = [
+        (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
+    ]
+    return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
+
+
+def stack_name(result: Result, stack_id: int) -> str:
+    """What people call a stack."""
+    if stack_id == OWN_STACK:
+        return "Across the axis"
+    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
+    return stack.name if stack is not None and stack.name else f"Stack {stack_id}"
+
+
+@lru_cache(maxsize=4)
+def _surface(
+    cloud: PointCloud, result: Result, element_id: int
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Chainage, clock, deviation and index in the cloud of one element's points."""
+    index = np.flatnonzero(result.element_id == element_id)
+    axis = result.element(element_id).axis
+    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index])
+    return chainage, clock, result.deviation[index].astype(np.float64), index
+
+
+@lru_cache(maxsize=8)
+def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> SectionState:
+    """The profile's points carried along the element's axis into the profile's plane."""
+    element = result.element(element_id)
+    profile = _profile(result, element_id, key)
+    assert profile is not None
+    chainage, centre = float(profile.chainage[0]), profile.centre[0]
+    tangent, normal = element.axis.tangent(chainage), profile.normal[0]
+    if normal @ tangent < 0:
+        normal = -normal
+    up = twelve_o_clock(normal)
+    right = np.cross(normal, up)
+    tilt = float(normal @ tangent)
+
+    def in_plane(points: Array) -> Array:
+        offset = points - centre
+        offset = offset - ((offset @ normal) / tilt)[..., None] * tangent
+        return 1000 * np.stack([offset @ right, offset @ up], axis=-1)
+
+    siblings = _profiles(result, element_id)
+    siblings = siblings[siblings.stack_id == key.stack_id]
+    xyz = _profile_points(cloud, result, key, profile, siblings)
+
+    major = profile.major_direction[0]
+    fitted = Ellipse(
+        (0.0, 0.0),
+        1000 * float(profile.semi_major[0]),
+        1000 * float(profile.semi_minor[0]),
+        float(np.arctan2(major @ up, major @ right)),
+    )
+    radius_mm = 1000 * float(element.radius_at(chainage))
+    axis_u, axis_v = in_plane(element.axis.at(chainage))
+    reference = Ellipse(
+        (float(axis_u), float(axis_v)),
+        radius_mm / tilt,
+        radius_mm,
+        float(np.arctan2(tangent @ up, tangent @ right)),
+    )
+    return SectionState(
+        element=element,
+        profile=profile,
+        points_uv=in_plane(xyz),
+        fitted=fitted,
+        reference=reference,
+        position=1 + int(np.flatnonzero(siblings.profile_index == key.profile_index)[0]),
+        count=len(siblings),
+        stack_name=stack_name(result, key.stack_id),
+        deformations=tuple(
+            d
+            for d in _deformations(result, element_id)
+            if d.chainage_start <= chainage <= d.chainage_end
+        ),
+    )
+
+
+def _profile_points(
+    cloud: PointCloud, result: Result, key: ProfileKey, profile: Profiles, siblings: Profiles
+) -> Array:
+    """Points of the element that lie in one profile, float64."""
+    chainages, _, _, index = _surface(cloud, result, int(profile.element_id[0]))
+    if key.stack_id == OWN_STACK:
+        # Neighbouring own profiles touch, so their spacing is their width.
+        width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
+        inside = np.abs(chainages - profile.chainage[0]) <= width / 2
+        return cloud.xyz[index[inside]].astype(np.float64)
+    stack = next(s for s in result.stacks if s.stack_id == key.stack_id)
+    xyz = cloud.xyz[index]
+    inside = stack.profile_index(xyz) == key.profile_index
+    # A stack's plane may cut a bend twice: only the branch of this profile counts.
+    near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
+    return xyz[inside & near].astype(np.float64)
