@@ -1,0 +1,196 @@
+"""Acceptance rules: what a code says of a deformation, from data files that users can edit.
+
+A rule is a TOML file, see ``resources/rules``. It holds criteria; each sets a limit on
+one measure of some kinds of deformation. A verdict respects the measurement's
+uncertainty: within two standard deviations of the limit a person has to look.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipecore.errors import SettingsError
+from pipecore.resources import resource
+from pipecore.types import Deformation, DeformationKind, Element, ElementKind, Verdict
+
+BAND_SD = 2.0
+"""Half width of the band around a limit, in standard deviations, that is to be reviewed."""
+
+
+class Measure(StrEnum):
+    """What a criterion limits."""
+
+    DEPTH_MM = "depth_mm"
+    DEPTH_PCT_OD = "depth_pct_od"
+    DEPTH_PCT_LENGTH = "depth_pct_length"
+    OVALITY_PCT = "ovality_pct"
+    OVALITY_MM = "ovality_mm"
+
+
+_SPOKEN = {
+    Measure.DEPTH_MM: "depth at most {:g} mm",
+    Measure.DEPTH_PCT_OD: "depth at most {:g} % of the outside diameter",
+    Measure.DEPTH_PCT_LENGTH: "at most {:g} % of the length",
+    Measure.OVALITY_PCT: "ovality at most {:g} %",
+    Measure.OVALITY_MM: "Dmax − Dmin at most {:g} mm",
+}
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """A limit on one measure of some kinds of deformation.
+
+    Parameters
+    ----------
+    kinds : tuple of DeformationKind
+    measure : Measure
+    limit : float
+        In the measure's unit; more is rejected.
+    element_kinds : tuple of ElementKind
+        Elements it applies to; empty means all.
+    od_above_mm, od_up_to_mm : float
+        Outside diameters it applies to; the upper bound belongs to it.
+    """
+
+    kinds: tuple[DeformationKind, ...]
+    measure: Measure
+    limit: float
+    element_kinds: tuple[ElementKind, ...] = ()
+    od_above_mm: float = 0.0
+    od_up_to_mm: float = np.inf
+
+    def applies_to(self, deformation: Deformation, element: Element) -> bool:
+        """Whether this criterion says anything about a deformation."""
+        return (
+            deformation.kind in self.kinds
+            and (not self.element_kinds or element.kind in self.element_kinds)
+            and self.od_above_mm < 1000 * outside_diameter(element) <= self.od_up_to_mm
+        )
+
+    def value(self, deformation: Deformation, element: Element) -> tuple[float, float]:
+        """Return the limited measure and its standard deviation, in the limit's unit."""
+        diameter = outside_diameter(element)
+        scale = {
+            Measure.DEPTH_MM: 1000.0,
+            Measure.DEPTH_PCT_OD: 100 / diameter,
+            Measure.DEPTH_PCT_LENGTH: 100 / element.axis.length,
+            Measure.OVALITY_PCT: 100.0,
+            Measure.OVALITY_MM: 1000 * diameter,
+        }[self.measure]
+        if self.measure in (Measure.OVALITY_PCT, Measure.OVALITY_MM):
+            # Depth and ovality of one stretch are the same amplitude in two forms.
+            depth, depth_sd = deformation.depth, deformation.depth_sd
+            relative_sd = depth_sd / depth if depth > 0 else np.nan
+            return scale * deformation.ovality, scale * deformation.ovality * relative_sd
+        return scale * deformation.depth, scale * deformation.depth_sd
+
+    def judge(self, deformation: Deformation, element: Element) -> Verdict:
+        """Return the verdict of this criterion alone."""
+        value, sd = self.value(deformation, element)
+        if not np.isfinite(value) or not np.isfinite(sd):
+            return Verdict.NOT_MEASURABLE
+        if value - BAND_SD * sd > self.limit:
+            return Verdict.REJECT
+        if value + BAND_SD * sd < self.limit:
+            return Verdict.ACCEPT
+        return Verdict.REVIEW
+
+    def __str__(self) -> str:
+        """Return the criterion as a person would say it."""
+        parts = [", ".join(self.kinds)]
+        if self.element_kinds:
+            parts.append("on " + ", ".join(self.element_kinds))
+        if self.od_above_mm > 0:
+            parts.append(f"OD above {self.od_above_mm:g} mm")
+        if np.isfinite(self.od_up_to_mm):
+            parts.append(f"OD up to {self.od_up_to_mm:g} mm")
+        return " · ".join(parts) + ": " + _SPOKEN[self.measure].format(self.limit)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """An acceptance rule with its source.
+
+    `name` is what the setting calls it (its file's name), `title` what a person does.
+    """
+
+    name: str
+    title: str
+    source: str
+    note: str
+    criteria: tuple[Criterion, ...]
+
+
+def outside_diameter(element: Element) -> float:
+    """Outside diameter that limits in percent refer to: the nominal one where known, metres."""
+    return element.nominal.outside_diameter if element.nominal else 2 * element.radius
+
+
+def judge(deformation: Deformation, element: Element, rule: Rule) -> Verdict:
+    """Return what `rule` says of a deformation on its element: the worst of its criteria.
+
+    A deformation that the rule says nothing about is for a person to review.
+    """
+    verdicts = {
+        c.judge(deformation, element) for c in rule.criteria if c.applies_to(deformation, element)
+    }
+    for verdict in (Verdict.REJECT, Verdict.NOT_MEASURABLE, Verdict.REVIEW, Verdict.ACCEPT):
+        if verdict in verdicts:
+            return verdict
+    return Verdict.REVIEW
+
+
+def list_rules() -> tuple[Rule, ...]:
+    """Return the rules that come with the program, by name."""
+    rules = (_read(path) for path in resource("rules").glob("*.toml"))
+    return tuple(sorted(rules, key=lambda rule: rule.name))
+
+
+def load_rule(name: str) -> Rule:
+    """Return a rule by the name of one that comes with the program, or by a file's path.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such rule, or its file is not a valid rule.
+    """
+    is_path = name.endswith(".toml")
+    path = Path(name) if is_path else resource("rules", f"{name}.toml")
+    if not path.is_file():
+        known = ", ".join(rule.name for rule in list_rules())
+        raise SettingsError(
+            f"There is no rule file {path}."
+            if is_path
+            else f"There is no acceptance rule “{name}”; choose one of {known}, or a .toml file."
+        )
+    return _read(path)
+
+
+def _read(path: Path) -> Rule:
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        criteria = tuple(_criterion(c) for c in data.pop("criteria"))
+        return Rule(name=path.stem, criteria=criteria, **data)
+    except KeyError as error:
+        raise SettingsError(f"The rule {path} lacks {error}.") from error
+    except (OSError, ValueError, TypeError, AttributeError) as error:
+        raise SettingsError(f"Cannot read the rule {path}: {error}.") from error
+
+
+def _criterion(data: Mapping[str, Any]) -> Criterion:
+    data = dict(data)
+    limit = data.pop("limit")
+    if isinstance(limit, bool) or not isinstance(limit, int | float) or limit <= 0:
+        raise ValueError(f"the limit {limit!r} is not a positive number")
+    return Criterion(
+        kinds=tuple(DeformationKind(k) for k in data.pop("kinds")),
+        measure=Measure(data.pop("measure")),
+        limit=float(limit),
+        element_kinds=tuple(ElementKind(k) for k in data.pop("element_kinds", ())),
+        **data,
+    )
