@@ -66,7 +66,7 @@ class Axis(Protocol):
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
         """Chainage, distance from the axis and clock angle of `points` (n, 3), each (n,).
 
-        The chainage may lie outside 0 … length. Clock angles are in 0 … 2π.
+        The chainage may lie outside 0 … length. Clock angles are in [0, 2π).
         """
         ...
 
@@ -96,7 +96,9 @@ def surface_points(axis: Axis, chainage: ArrayLike, radius: ArrayLike, clock: Ar
 
 
 def _polar(up_part: Array, right_part: Array) -> tuple[Array, Array]:
-    return np.hypot(up_part, right_part), np.mod(np.arctan2(right_part, up_part), 2 * np.pi)
+    clock = np.mod(np.arctan2(right_part, up_part), 2 * np.pi)
+    # A hair before 12:00 rounds to a full turn, which would fall out of any map's last cell.
+    return np.hypot(up_part, right_part), np.where(clock < 2 * np.pi, clock, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
