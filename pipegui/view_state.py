@@ -8,6 +8,7 @@ Nothing here knows Qt or VTK.
 
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from pipecore.types import (
     Result,
     Stack,
 )
+from pipegui import selecting
 from pipegui.document import Document, ProfileKey, Scan, Selection, ViewOptions
 
 Array = NDArray[np.float64]
@@ -76,7 +78,7 @@ class RadiusPlotState(_ComparedByParts):
     stacks : tuple of (int, str, int)
         Id, name and number of profiles of the stacks to choose from.
     selected_index : int, optional
-        `profile_index` of the selected profile, if it is of this stack.
+        `profile_index` of the profile whose section is shown, if it is of this stack.
     deformations : tuple of Deformation
         Those of the element.
     selected_deformation : int
@@ -109,7 +111,7 @@ class Ellipse:
 
 @dataclass(frozen=True, eq=False)
 class SectionState(_ComparedByParts):
-    """The section view of the selected profile.
+    """The section view: the selected profile, or the one at the peak of the deformation.
 
     Parameters
     ----------
@@ -156,7 +158,7 @@ class MapState(_ComparedByParts):
     deformations: tuple[Deformation, ...] = ()
     selected_deformation: int = NO_ID
     selected_chainage: float | None = None
-    """Of the selected profile."""
+    """Of the profile whose section is shown."""
     limit_mm: float = 10.0
     """The colours span ± this."""
 
@@ -228,9 +230,11 @@ def resolve(document: Document) -> ViewState:
     """Return what each part of the window shows for `document`."""
     scan, result = document.scan, document.result
     selection, view = document.selection, document.view
-    profile = None
-    if result is not None and selection.profile is not None:
-        profile = _profile(result, selection.element_id, selection.profile)
+    profile, shown = None, None
+    if result is not None:
+        if selection.profile is not None:
+            profile = _profile(result, selection.element_id, selection.profile)
+        shown = selecting.shown_profile(result, selection)
     return ViewState(
         window=WindowState(scan, view, selection != Selection()),
         scene=SceneState(
@@ -251,20 +255,21 @@ def resolve(document: Document) -> ViewState:
         settings=document.settings,
         table=TableState(result, selection.deformation_id),
         properties=PropertiesState(scan, selection, profile),
-        **_element_states(scan, selection, view, profile),
+        **_element_states(scan, selection, view, shown),
     )
 
 
 def _element_states(
-    scan: Scan | None, selection: Selection, view: ViewOptions, profile: Profiles | None
-) -> dict:
-    """States of the three views of the selected element."""
+    scan: Scan | None, selection: Selection, view: ViewOptions, shown: ProfileKey | None
+) -> dict[str, Any]:
+    """States of the three views of the selected element; `shown` is the profile they mark."""
     if scan is None or scan.result is None or not selection.element_id:
         return {}
     result = scan.result
     element = result.element(selection.element_id)
     deformations = _deformations(result, element.element_id)
     stack_id = selection.profile.stack_id if selection.profile else view.plot_stack
+    profile = _profile(result, element.element_id, shown) if shown else None
     choices = _stack_choices(result, element.element_id)
     if stack_id not in {choice[0] for choice in choices}:
         stack_id = choices[0][0] if choices else OWN_STACK
@@ -273,14 +278,14 @@ def _element_states(
         profiles=_profiles(result, element.element_id),
         stack_id=stack_id,
         stacks=choices,
-        selected_index=selection.profile.profile_index if selection.profile else None,
+        selected_index=shown.profile_index if shown and shown.stack_id == stack_id else None,
         deformations=deformations,
         selected_deformation=selection.deformation_id,
     )
-    if profile is None:
+    if profile is None or shown is None:
         section = SectionState(element=element)
     else:
-        section = _section(scan.cloud, result, element.element_id, selection.profile)
+        section = _section(scan.cloud, result, element.element_id, shown)
     chainage, clock, deviation, _ = _surface(scan.cloud, result, element.element_id)
     deviation_map = MapState(
         element=element,
