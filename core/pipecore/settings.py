@@ -403,12 +403,10 @@ def _convert(key: str, value: Any, spec: FieldSpec) -> Any:
             return float(value)
         if spec.kind is str and isinstance(value, str):
             return value
-        if not isinstance(value, str | bool | float | int):
+        if key == "stacks.directions":
+            if isinstance(value, str):
+                value = [vector.split(",") for vector in value.split(";") if vector.strip()]
             return tuple(tuple(float(c) for c in vector) for vector in value)
-        if isinstance(value, str):
-            return tuple(
-                tuple(float(c) for c in vector.split(",")) for vector in value.split(";") if vector
-            )
     except (ValueError, TypeError):
         pass
     raise SettingsError(f"“{value}” does not fit the setting “{key}”{_expected(spec)}.")
@@ -422,7 +420,8 @@ def _expected(spec: FieldSpec) -> str:
 
 def _check(key: str, value: Any, spec: FieldSpec) -> None:
     if spec.kind is float:
-        if not isinstance(value, int | float) or not math.isfinite(value):
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not math.isfinite(value):
             raise SettingsError(f"The setting “{key}” must be a number, not {value!r}.")
         if spec.minimum is not None and value < spec.minimum:
             raise SettingsError(
@@ -439,3 +438,5 @@ def _check(key: str, value: Any, spec: FieldSpec) -> None:
                 raise SettingsError(
                     f"The stack {list(vector)} is not a direction x, y, z with an optional width."
                 )
+    elif not isinstance(value, spec.kind):
+        raise SettingsError(f"{value!r} does not fit the setting “{key}”{_expected(spec)}.")
