@@ -1,0 +1,263 @@
+"""What is said of things on screen: summaries, properties, hover texts. Qt-free."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipecore.geometry import ArcAxis
+from pipecore.report.format import (
+    NOT_MEASURABLE,
+    cell,
+    format_clock,
+    format_coordinate,
+    format_count,
+    format_measure,
+)
+from pipecore.types import (
+    NO_ID,
+    Deformation,
+    Element,
+    ElementKind,
+    PointCloud,
+    Profiles,
+    Result,
+    Verdict,
+)
+from pipegui.document import Scan, Selection
+from pipegui.view_state import PropertiesState, stack_name
+
+ARC_TOO_SHORT = "The scan sees {arc:.0f}° of the circumference: too little to carry this number."
+
+
+@dataclass(frozen=True)
+class Property:
+    """A line of the properties: what, how much, and what is copied."""
+
+    label: str
+    text: str
+    plain: str = ""
+    hint: str = ""
+
+    @property
+    def is_measurable(self) -> bool:
+        """Whether there is a number."""
+        return self.text != NOT_MEASURABLE
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading between properties."""
+
+    text: str
+
+
+def _measure(
+    label: str, value_m: float, sd_m: float = math.nan, *, unit: str = "mm", hint: str = ""
+) -> Property:
+    scale = {"mm": 1000.0, "m": 1.0, "%": 100.0, "°": 180 / math.pi}[unit]
+    decimals = {"mm": 1, "m": 3, "%": 2, "°": 0}[unit]
+    text = format_measure(scale * value_m, scale * sd_m, unit, decimals=decimals)
+    return Property(label, text, cell(scale * value_m, 4), hint)
+
+
+def summary(result: Result) -> str:
+    """One line on a result: "23 pipes in 7 runs, 5 deformations, 2 to reject"."""
+    n_runs = len({e.run_id for e in result.elements})
+    n_pipes = sum(e.kind is ElementKind.CYLINDER for e in result.elements)
+    n_others = len(result.elements) - n_pipes
+    if not result.elements:
+        return "No pipes found. Try a smaller smallest radius, or check the length unit."
+    found = format_count(n_pipes, "pipe")
+    if n_others:
+        found += " and " + format_count(n_others, "other element")
+    n_rejected = sum(d.verdict is Verdict.REJECT for d in result.deformations)
+    deformations = format_count(len(result.deformations), "deformation")
+    rejected = f", {n_rejected} to reject" if n_rejected else ""
+    return f"{found} in {format_count(n_runs, 'run')}, {deformations}{rejected}"
+
+
+def point_count(n_points: int) -> str:
+    """A rounded count of points: "4.3 M points"."""
+    if n_points >= 999_950:
+        return f"{n_points / 1e6:.1f} M points"
+    if n_points >= 10_000:
+        return f"{n_points / 1e3:.0f} k points"
+    return format_count(n_points, "point")
+
+
+def coordinates(cloud: PointCloud, point_index: int) -> str:
+    """World coordinates of a point: "E 432 105.214  N 6 201 877.530  H 112.031"."""
+    world = cloud.world(cloud.xyz[point_index])
+    names = "ENH" if cloud.crs or np.abs(cloud.origin).max() > 1e4 else "XYZ"
+    return "   ".join(
+        f"{n} {format_coordinate(float(v))}" for n, v in zip(names, world, strict=True)
+    )
+
+
+def hover_text(scan: Scan, point_index: int) -> str:
+    """What is under the cursor: name, radius, deviation; "" where nothing was detected."""
+    result = scan.result
+    element_id = NO_ID if result is None else int(result.element_id[point_index])
+    if result is None or element_id == NO_ID:
+        return ""
+    element = result.element(element_id)
+    deviation = 1000 * float(result.deviation[point_index])
+    lines = [element.label, f"radius {radius_text(element)}"]
+    if math.isfinite(deviation):
+        side = "outward" if deviation > 0 else "inward"
+        lines.append(f"{abs(deviation):.1f} mm {side}")
+    return "\n".join(lines)
+
+
+def radius_text(element: Element) -> str:
+    """Radius with its uncertainty."""
+    return format_measure(1000 * element.radius, 1000 * element.radius_sd, "mm")
+
+
+def outside_diameter(element: Element) -> float:
+    """The nominal outside diameter where known, else the measured one, metres."""
+    return element.nominal.outside_diameter if element.nominal else 2 * element.radius
+
+
+def title(result: Result | None, selection: Selection) -> str:
+    """What is selected: "Pipe 2 · dent 1"."""
+    if result is None or selection == Selection():
+        return ""
+    if not selection.element_id:
+        return f"Run {selection.run_id}"
+    parts = [result.element(selection.element_id).label]
+    if selection.deformation_id:
+        deformation = result.deformation(selection.deformation_id)
+        parts.append(f"{deformation.kind} {deformation.deformation_id}")
+    if selection.profile is not None:
+        parts.append(f"profile {selection.profile.profile_index}")
+    return " · ".join(parts)
+
+
+def properties(state: PropertiesState) -> list[Property | Heading]:
+    """The properties of the selection, the innermost thing first."""
+    scan, selection = state.scan, state.selection
+    if scan is None:
+        return []
+    result = scan.result
+    if result is None or selection == Selection():
+        return list(_of_scan(scan))
+    if not selection.element_id:
+        return list(_of_run(result, selection.run_id))
+    lines: list[Property | Heading] = []
+    element = result.element(selection.element_id)
+    if state.profile is not None:
+        lines += [Heading(f"Profile {int(state.profile.profile_index[0])}")]
+        lines += _of_profile(state.profile, result)
+    if selection.deformation_id:
+        deformation = result.deformation(selection.deformation_id)
+        lines += [Heading(f"{str(deformation.kind).capitalize()} {deformation.deformation_id}")]
+        lines += _of_deformation(deformation, element, result)
+    return [*lines, Heading(element.label), *_of_element(element, result)]
+
+
+def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
+    cloud = scan.cloud
+    yield Heading(scan.name)
+    yield Property("Points", f"{len(cloud):,}", str(len(cloud)))
+    low, high = cloud.xyz.min(axis=0), cloud.xyz.max(axis=0)
+    extent = " × ".join(f"{v:.2f}" for v in high - low)
+    yield Property("Extent", f"{extent} m", " ".join(f"{v:.3f}" for v in high - low))
+    middle = cloud.world((low + high) / 2)
+    for name, value in zip("XYZ", middle, strict=True):
+        yield Property(f"Middle {name}", f"{format_coordinate(float(value))} m", f"{value:.4f}")
+    if cloud.crs:
+        yield Property("Coordinates", cloud.crs, cloud.crs)
+    if cloud.source is not None:
+        yield Property("File", cloud.source.name, str(cloud.source), hint=str(cloud.source))
+    if scan.result is not None:
+        seconds = sum(scan.result.seconds.values())
+        yield Property("Found", summary(scan.result), hint=f"Detected in {seconds:.1f} s.")
+
+
+def _of_run(result: Result, run_id: int) -> Iterator[Property | Heading]:
+    elements = [e for e in result.elements if e.run_id == run_id]
+    ids = {e.element_id for e in elements}
+    yield Heading(f"Run {run_id}")
+    yield Property("Elements", str(len(elements)), str(len(elements)))
+    yield _measure("Length", sum(e.axis.length for e in elements), unit="m")
+    sizes = sorted({e.nominal.name for e in elements if e.nominal})
+    yield Property("Sizes", ", ".join(sizes) or "no nominal size within tolerance")
+    n_deformations = sum(d.element_id in ids for d in result.deformations)
+    yield Property("Deformations", str(n_deformations), str(n_deformations))
+
+
+def _of_element(element: Element, result: Result) -> Iterator[Property]:
+    too_short = ARC_TOO_SHORT.format(arc=math.degrees(element.arc))
+    yield _measure("Radius", element.radius, element.radius_sd)
+    if element.kind is ElementKind.CONE:
+        yield _measure("Radius at end", element.radius_end, element.radius_sd)
+    if element.nominal is not None:
+        od = f"OD {1000 * element.nominal.outside_diameter:.1f} mm"
+        yield Property("Nominal size", f"{element.nominal.name} ({od})", element.nominal.name)
+    else:
+        yield Property("Nominal size", "none within tolerance")
+    if isinstance(element.axis, ArcAxis):
+        yield _measure("Bend radius", element.axis.bend_radius)
+        yield _measure("Bend angle", element.axis.bend_angle, unit="°")
+    yield _measure("Length", element.axis.length, unit="m")
+    yield _measure(
+        "Ovality",
+        element.ovality,
+        element.ovality_sd,
+        unit="%",
+        hint="(Dmax − Dmin) / Dnom" if math.isfinite(element.ovality) else too_short,
+    )
+    off_axis = "Largest distance of the measured axis from the fitted one."
+    yield _measure("Straightness", element.straightness, hint=off_axis)
+    yield _measure("Arc seen", element.arc, unit="°", hint="Median over the profiles.")
+    yield _measure("Residual", element.rms, hint="Root mean square distance from the surface.")
+    yield Property("Points", f"{element.n_points:,}", str(element.n_points))
+    yield Property("Profiles", f"{element.n_profiles:,}", str(element.n_profiles))
+    for name, point in (("Start", element.axis.start), ("End", element.axis.end)):
+        yield _position(name, point + result.origin)
+    if element.gaps:
+        gaps = ", ".join(f"{a:.2f} – {b:.2f} m" for a, b in element.gaps)
+        yield Property("Gaps", gaps, hint="Chainages without profiles.")
+
+
+def _of_deformation(
+    deformation: Deformation, element: Element, result: Result
+) -> Iterator[Property]:
+    share = 1 / outside_diameter(element)
+    yield Property("Verdict", str(deformation.verdict), hint=f"Rule: {deformation.rule}")
+    yield _measure("Depth", deformation.depth, deformation.depth_sd)
+    yield _measure("Depth of OD", deformation.depth * share, deformation.depth_sd * share, unit="%")
+    size = f"{1000 * deformation.length:.0f} × {1000 * deformation.width:.0f}"
+    yield Property("Length × width", f"{size} mm", size, hint="Along the axis × around.")
+    yield _measure("Chainage", deformation.chainage, unit="m")
+    clock = format_clock(deformation.clock)
+    yield Property("Clock", clock, clock, hint="Looking along increasing chainage, 12:00 up.")
+    if deformation.kind.value == "ovality":
+        yield _measure("Ovality", deformation.ovality, unit="%", hint="(Dmax − Dmin) / Dnom")
+    if math.isfinite(deformation.strain):
+        yield _measure("Strain", deformation.strain, unit="%", hint="Indicative only.")
+    yield _position("Peak", deformation.peak + result.origin)
+
+
+def _of_profile(profile: Profiles, result: Result) -> Iterator[Property]:
+    row = {f: getattr(profile, f)[0] for f in profile.__dataclass_fields__}
+    name = stack_name(result, int(row["stack_id"]))
+    yield Property("Stack", name, name)
+    yield _measure("Chainage", row["chainage"], unit="m")
+    yield _measure("Radius", row["radius"], row["radius_sd"])
+    yield _measure("Semi-minor axis", row["semi_minor"])
+    yield _measure("Semi-major axis", row["semi_major"])
+    too_short = ARC_TOO_SHORT.format(arc=math.degrees(row["arc"]))
+    hint = "(Dmax − Dmin) / Dnom" if math.isfinite(row["ovality"]) else too_short
+    yield _measure("Ovality", row["ovality"], unit="%", hint=hint)
+    yield _measure("Centre off axis", row["centre_deviation"])
+    yield _measure("Arc seen", row["arc"], unit="°")
+    yield Property("Points", f"{int(row['n_points']):,}", str(int(row["n_points"])))
+
+
+def _position(label: str, world: np.ndarray) -> Property:
+    text = "  ".join(format_coordinate(float(v)) for v in world)
+    return Property(label, text, " ".join(f"{v:.4f}" for v in world), hint="X, Y, Z in metres")

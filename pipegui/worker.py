@@ -1,0 +1,186 @@
+"""Long work beside the window: one job at a time, told as typed events.
+
+Each job ends in exactly one of `Finished`, `Failed` and `Cancelled`. Starting a job
+cancels the one that runs; what a job still says after that is dropped, except its end,
+which is then `Cancelled`.
+"""
+
+import queue
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+from PySide6.QtCore import QObject, Qt, Signal, Slot
+
+from pipecore.errors import CancelledError, PipecoreError
+from pipecore.progress import Progress
+
+
+@dataclass(frozen=True)
+class Started:
+    """A job has begun; `title` says what it does, such as "Detecting"."""
+
+    job: int
+    title: str
+
+
+@dataclass(frozen=True)
+class Progressed:
+    """A job is in a stage, done to a fraction (0 to 1) of the stage."""
+
+    job: int
+    stage: str
+    fraction: float
+    seconds_left: float | None
+    """For the stage, once it has run long enough to tell."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A job has made its value."""
+
+    job: int
+    value: Any
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A job could not do what it should; `details` are for a bug report."""
+
+    job: int
+    message: str
+    details: str
+
+
+@dataclass(frozen=True)
+class Cancelled:
+    """A job was stopped on request."""
+
+    job: int
+
+
+Event = Started | Progressed | Finished | Failed | Cancelled
+Work = Callable[[Progress], Any]
+
+EVENTS_PER_SECOND = 15
+
+
+class _JobProgress:
+    """The progress that a job reports to: emits at a calm pace, raises once cancelled."""
+
+    def __init__(self, job: int, emit: Callable[[Event], None]) -> None:
+        self.is_cancelled = threading.Event()
+        self._job, self._emit = job, emit
+        self._stage, self._since = "", 0.0
+        self._last_emitted = 0.0
+
+    def update(self, stage: str, fraction: float) -> None:
+        """Tell how far a stage is."""
+        if self.is_cancelled.is_set():
+            raise CancelledError
+        now = time.monotonic()
+        is_new = stage != self._stage
+        if is_new:
+            self._stage, self._since = stage, now
+        if not is_new and now - self._last_emitted < 1 / EVENTS_PER_SECOND:
+            return
+        self._last_emitted = now
+        elapsed = now - self._since
+        can_tell = elapsed > 1.0 and fraction > 0.05
+        left = elapsed * (1 - fraction) / fraction if can_tell else None
+        self._emit(Progressed(self._job, stage, min(max(fraction, 0.0), 1.0), left))
+
+
+class Worker(QObject):
+    """Runs jobs one after the other in one thread of its own.
+
+    One thread only, because numba's simplest threading layer ends the process when two
+    threads use it.
+    """
+
+    event = Signal(object)
+    """An `Event`, delivered in the window's thread."""
+    _posted = Signal(object)
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._numbers = count(1)
+        self._current = 0
+        self._progress: _JobProgress | None = None
+        self._jobs: queue.SimpleQueue[tuple[_JobProgress, int, Work] | None] = queue.SimpleQueue()
+        self._posted.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
+        self._thread = threading.Thread(target=self._run, name="pipegui-worker", daemon=True)
+        self._thread.start()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a job is running or waiting."""
+        return self._current != 0
+
+    def start(self, title: str, work: Work) -> int:
+        """Begin `work(progress)`, which returns the job's value; returns the job's number."""
+        self.cancel()
+        job = next(self._numbers)
+        self._current, self._progress = job, _JobProgress(job, self._posted.emit)
+        self.event.emit(Started(job, title))
+        self._jobs.put((self._progress, job, work))
+        return job
+
+    def cancel(self) -> None:
+        """Ask the job that runs to stop, at its next sign of progress."""
+        if self._progress is not None:
+            self._progress.is_cancelled.set()
+
+    def close(self, timeout_s: float = 5.0) -> bool:
+        """Cancel, and wait for the thread to end; returns whether it did."""
+        self.cancel()
+        self._posted.disconnect(self._deliver)
+        self._jobs.put(None)
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        while (item := self._jobs.get()) is not None:
+            progress, job, work = item
+            self._posted.emit(_end_of(progress, job, work))
+
+    @Slot(object)
+    def _deliver(self, event: Event) -> None:
+        is_end = not isinstance(event, Started | Progressed)
+        is_stale = event.job != self._current
+        if self._progress is not None and not is_stale:
+            # A value that comes after the cancel was asked for is not wanted any more.
+            is_unwanted = self._progress.is_cancelled.is_set()
+        else:
+            is_unwanted = True
+        if is_end and is_unwanted:
+            event = Cancelled(event.job)
+        if is_end and not is_stale:
+            self._current, self._progress = 0, None
+        if is_end or not is_unwanted:
+            self.event.emit(event)
+
+
+def _end_of(progress: _JobProgress, job: int, work: Work) -> Event:
+    """Do the work; whatever happens becomes the one event that ends it."""
+    try:
+        progress.update("", 0.0)
+        return Finished(job, work(progress))
+    except CancelledError:
+        return Cancelled(job)
+    except PipecoreError as error:
+        return Failed(job, str(error), traceback.format_exc())
+    except MemoryError:
+        return Failed(
+            job,
+            "There is not enough memory for this scan. Close other programs or thin the scan.",
+            traceback.format_exc(),
+        )
+    except BaseException as error:  # a thread must not die of its work
+        what = f"Something went wrong inside the program ({type(error).__name__})."
+        message = f"{what} Your scans and earlier results are safe."
+        return Failed(job, message, traceback.format_exc())
