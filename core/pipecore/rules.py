@@ -64,10 +64,10 @@ class Criterion:
     od_above_mm: float = 0.0
     od_up_to_mm: float = np.inf
 
-    def applies_to(self, deformation: Deformation, element: Element) -> bool:
-        """Whether this criterion says anything about a deformation."""
+    def covers(self, kind: DeformationKind, element: Element) -> bool:
+        """Whether this criterion says anything about such a deformation of an element."""
         return (
-            deformation.kind in self.kinds
+            kind in self.kinds
             and (not self.element_kinds or element.kind in self.element_kinds)
             and self.od_above_mm < 1000 * outside_diameter(element) <= self.od_up_to_mm
         )
@@ -137,12 +137,28 @@ def judge(deformation: Deformation, element: Element, rule: Rule) -> Verdict:
     A deformation that the rule says nothing about is for a person to review.
     """
     verdicts = {
-        c.judge(deformation, element) for c in rule.criteria if c.applies_to(deformation, element)
+        criterion.judge(deformation, element)
+        for criterion in rule.criteria
+        if criterion.covers(deformation.kind, element)
     }
     for verdict in (Verdict.REJECT, Verdict.NOT_MEASURABLE, Verdict.REVIEW, Verdict.ACCEPT):
         if verdict in verdicts:
             return verdict
     return Verdict.REVIEW
+
+
+def dent_limit(element: Element, rule: Rule) -> float:
+    """Depth in metres above which `rule` rejects a dent on an element; inf if none."""
+    diameter = outside_diameter(element)
+    metres_per = {Measure.DEPTH_MM: 0.001, Measure.DEPTH_PCT_OD: diameter / 100}
+    return min(
+        (
+            criterion.limit * metres_per[criterion.measure]
+            for criterion in rule.criteria
+            if criterion.measure in metres_per and criterion.covers(DeformationKind.DENT, element)
+        ),
+        default=np.inf,
+    )
 
 
 def list_rules() -> tuple[Rule, ...]:

@@ -1,0 +1,114 @@
+"""The report of a detection: tables for programs, a page for people, a cloud for viewers.
+
+>>> from pipecore.report import write_report
+>>> write_report("report", cloud, result)
+
+Importing this package imports neither the plot library nor the LAZ writer.
+"""
+
+import os
+
+from pipecore.io import write_directory, write_file, write_laz
+from pipecore.progress import NoProgress, Progress
+from pipecore.report.result_json import result_to_dict, write_result_json
+from pipecore.report.summary import by_verdict, summarise
+from pipecore.report.tables import (
+    write_deformations_csv,
+    write_elements_csv,
+    write_profiles_csv,
+)
+from pipecore.types import PointCloud, Result
+
+__all__ = [
+    "by_verdict",
+    "result_to_dict",
+    "summarise",
+    "write_deformations_csv",
+    "write_elements_csv",
+    "write_html",
+    "write_profiles_csv",
+    "write_report",
+    "write_segments",
+]
+
+
+def write_report(
+    directory: str | os.PathLike[str],
+    cloud: PointCloud,
+    result: Result,
+    *,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> None:
+    """Write the whole report into a folder: all of it or nothing.
+
+    It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``result.json``,
+    ``segments.laz``, ``report.html`` and ``settings.toml``.
+
+    Parameters
+    ----------
+    directory : path
+        Made if it is not there; its parent must be.
+    cloud : PointCloud
+        The cloud that `result` was detected in.
+    result : Result
+    overwrite : bool
+        Whether the folder may already hold files; those of a former report are replaced.
+    progress : Progress, optional
+        May cancel; then nothing was written.
+
+    Raises
+    ------
+    WriteError
+        If the folder holds files and `overwrite` is not set, or a file cannot be written.
+    SettingsError
+        If the settings' acceptance rule is no longer there.
+    CancelledError
+        From `progress`.
+    """
+    progress = progress or NoProgress()
+    with write_directory(directory, overwrite=overwrite) as folder:
+        (folder / "settings.toml").write_text(result.settings.to_toml(), encoding="utf-8")
+        write_elements_csv(folder / "elements.csv", result)
+        write_deformations_csv(folder / "deformations.csv", result)
+        write_profiles_csv(folder / "profiles.csv", result, progress)
+        write_result_json(folder / "result.json", result)
+        write_html(folder / "report.html", cloud, result, progress)
+        write_segments(folder / "segments.laz", cloud, result, progress)
+
+
+def write_html(
+    path: str | os.PathLike[str],
+    cloud: PointCloud,
+    result: Result,
+    progress: Progress | None = None,
+) -> None:
+    """Write the report as one HTML page; errors as for `write_report`."""
+    from pipecore.report.html import render_html  # noqa: PLC0415
+
+    page = render_html(cloud, result, progress)
+    with write_file(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+
+
+def write_segments(
+    path: str | os.PathLike[str],
+    cloud: PointCloud,
+    result: Result,
+    progress: Progress | None = None,
+) -> None:
+    """Write the cloud as LAZ with segment_id, element_id and deviation_mm of each point.
+
+    Ids are 0 and deviations nan for points of none. Errors as for `write_report`.
+    """
+    write_laz(
+        path,
+        cloud,
+        {
+            "segment_id": result.segment_id,
+            "element_id": result.element_id,
+            "deviation_mm": 1000 * result.deviation,
+        },
+        length_unit=result.settings.input.length_unit,
+        progress=progress,
+    )

@@ -1,0 +1,177 @@
+"""Small figures of one deformation, as SVG to stand inside a page.
+
+Left the radius along the element; right what shows the kind best: the unrolled map of a
+dent or bulge, the section of an ovality, the path of the centres of a bow or kink.
+"""
+
+import io
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipecore.report.format import format_clock
+from pipecore.types import (
+    OWN_STACK,
+    Array,
+    Deformation,
+    DeformationKind,
+    Element,
+    PointCloud,
+    Result,
+)
+
+INK = "#333333"
+BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8a8a8a"
+STYLE: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "axes.titlesize": 8.0,
+    "axes.titlelocation": "left",
+    # Text stays text (searched, in the page's font), ids are the same in every run.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "pipecore",
+}
+MAP_CELLS_AROUND = 60
+SECTION_HALF_WIDTH = 0.02
+
+
+def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result) -> str:
+    """Return the figure of one deformation as an ``<svg>`` element."""
+    element = result.element(deformation.element_id)
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(7.4, 2.3), layout="constrained")
+        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+        _draw_radius(left, deformation, element, result)
+        if deformation.kind in (DeformationKind.DENT, DeformationKind.BULGE):
+            _draw_map(right, deformation, element, cloud, result)
+        elif deformation.kind is DeformationKind.OVALITY:
+            _draw_section(right, deformation, element, cloud, result)
+        else:
+            _draw_centres(right, deformation, element, result)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+    svg = text.getvalue()
+    return svg[svg.index("<svg") :]
+
+
+def _mark_extent(axes: Axes, deformation: Deformation) -> None:
+    axes.axvspan(
+        deformation.chainage_start, deformation.chainage_end, color=VERMILION, alpha=0.12, lw=0
+    )
+    axes.axvline(deformation.chainage, color=VERMILION, lw=0.8)
+
+
+def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
+    profiles = result.profiles.of_element(element.element_id, OWN_STACK)
+    _mark_extent(axes, deformation)
+    chainage = np.linspace(0, element.axis.length, 50)
+    axes.plot(chainage, 1000 * element.radius_at(chainage), color=GREY, lw=1.0, label="fitted")
+    axes.plot(
+        profiles.chainage, 1000 * profiles.semi_minor, color=BLUE, lw=0.8, label="semi-minor axis"
+    )
+    axes.errorbar(
+        profiles.chainage,
+        1000 * profiles.radius,
+        yerr=1000 * np.nan_to_num(profiles.radius_sd),
+        fmt=".",
+        ms=2.5,
+        color=INK,
+        elinewidth=0.5,
+        label="radius ± sd",
+    )
+    axes.set(xlabel="chainage (m)", title=f"{element.label}: radius (mm)")
+    axes.legend(frameon=False, fontsize=7, ncols=3, handlelength=1.2, columnspacing=1.0)
+    axes.margins(y=0.25)
+
+
+def _points_of(element: Element, cloud: PointCloud, result: Result) -> tuple[Array, Array, Array]:
+    """Chainage, clock and deviation of an element's points."""
+    rows = np.flatnonzero(result.element_id == element.element_id)
+    chainage, _, clock = element.axis.pipe_coordinates(np.asarray(cloud.xyz[rows], np.float64))
+    return chainage, clock, np.asarray(result.deviation[rows], np.float64)
+
+
+def _draw_map(
+    axes: Axes, deformation: Deformation, element: Element, cloud: PointCloud, result: Result
+) -> None:
+    chainage, clock, deviation = _points_of(element, cloud, result)
+    reach = (deformation.chainage_end - deformation.chainage_start) / 2 + 2 * element.radius
+    low = max(0.0, deformation.chainage - reach)
+    high = min(element.axis.length, deformation.chainage + reach)
+    # The deformation stands in the middle of the map, wherever it is on the clock.
+    around = np.mod(clock - deformation.clock + np.pi, 2 * np.pi) - np.pi
+    cell = 2 * np.pi * element.radius / MAP_CELLS_AROUND
+    bins = [max(1, round((high - low) / cell)), MAP_CELLS_AROUND]
+    box = [[low, high], [-np.pi, np.pi]]
+    valid = np.isfinite(deviation)
+    where: dict[str, Any] = {"bins": bins, "range": box}
+    count = np.histogram2d(chainage[valid], around[valid], **where)[0]
+    total = np.histogram2d(chainage[valid], around[valid], weights=deviation[valid], **where)[0]
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+    depth = deformation.depth if np.isfinite(deformation.depth) else 0.01
+    limit = float(np.ceil(1000 * depth))
+    axes.set_facecolor("#eeeeee")  # holes stay holes
+    image = axes.imshow(
+        1000 * mean.T,
+        extent=(low, high, np.pi, -np.pi),
+        aspect="auto",
+        cmap="RdBu_r",
+        vmin=-limit,
+        vmax=limit,
+        interpolation="nearest",
+    )
+    axes.plot(deformation.chainage, 0, "+", color="black", ms=7, mew=1.0)
+    axes.set(xlabel="chainage (m)", title="deviation (mm), unrolled; blue inward, red outward")
+    _set_clock_ticks(axes, deformation.clock)
+    axes.figure.colorbar(image, ax=axes, ticks=[-limit, 0, limit], pad=0.02, aspect=12)
+
+
+def _set_clock_ticks(axes: Axes, middle: float) -> None:
+    hours = np.arange(0, 2 * np.pi, np.pi / 2)
+    ticks = np.mod(hours - middle + np.pi, 2 * np.pi) - np.pi
+    axes.set_yticks(ticks, [format_clock(hour) for hour in hours])
+
+
+def _draw_section(
+    axes: Axes, deformation: Deformation, element: Element, cloud: PointCloud, result: Result
+) -> None:
+    chainage, clock, deviation = _points_of(element, cloud, result)
+    near = np.abs(chainage - deformation.chainage) < SECTION_HALF_WIDTH
+    near &= np.isfinite(deviation)
+    radius = float(element.radius_at(deformation.chainage))
+    # So exaggerated that the deviation is a fifth of the radius, by a round factor.
+    exaggeration = max(1, round(radius / 5 / max(deformation.depth, 1e-3)))
+    circle = np.linspace(0, 2 * np.pi, 181)
+    axes.plot(1000 * radius * np.sin(circle), 1000 * radius * np.cos(circle), color=GREY, lw=1.0)
+    drawn = 1000 * (radius + exaggeration * deviation[near])
+    axes.plot(drawn * np.sin(clock[near]), drawn * np.cos(clock[near]), ".", ms=2, color=INK)
+    if np.isfinite(deformation.depth) and np.isfinite(deformation.clock):
+        oval = radius + exaggeration * deformation.depth * np.cos(2 * (circle - deformation.clock))
+        axes.plot(1000 * oval * np.sin(circle), 1000 * oval * np.cos(circle), color=BLUE, lw=1.0)
+    axes.set_aspect("equal")
+    axes.margins(0.12)
+    axes.set(
+        xlabel="mm",
+        title=f"section at {deformation.chainage:.2f} m, 12:00 up, deviations × {exaggeration}",
+    )
+
+
+def _draw_centres(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
+    profiles = result.profiles.of_element(element.element_id, OWN_STACK)
+    _mark_extent(axes, deformation)
+    axes.plot(profiles.chainage, 1000 * profiles.centre_deviation, ".-", ms=3, lw=0.6, color=INK)
+    axes.set(xlabel="chainage (m)", title="distance of the centres from the axis (mm)")
+    axes.set_ylim(bottom=0)

@@ -1,0 +1,267 @@
+"""``report.html``: the result on one page that needs no other file, to read and to print."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+
+import pipecore
+from pipecore.geometry import ArcAxis
+from pipecore.progress import NoProgress, Progress
+from pipecore.report.figures import draw_deformation
+from pipecore.report.format import (
+    NOT_MEASURABLE,
+    format_clock,
+    format_count,
+    format_measure,
+)
+from pipecore.report.summary import VERDICT_ORDER, by_verdict, summarise
+from pipecore.report.world import FileCoordinates
+from pipecore.resources import resource
+from pipecore.rules import Rule, dent_limit, load_rule, outside_diameter
+from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipecore.types import (
+    Deformation,
+    DeformationKind,
+    Element,
+    ElementKind,
+    PointCloud,
+    Result,
+)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table on the page."""
+
+    title: str
+    numeric: bool = True
+
+
+def render_html(cloud: PointCloud, result: Result, progress: Progress | None = None) -> str:
+    """Return the report as one HTML page.
+
+    Raises
+    ------
+    SettingsError
+        If the settings' acceptance rule is no longer there.
+    """
+    rule = load_rule(result.settings.deformation.rule)
+    place = FileCoordinates.of(result)
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(resource("report")),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    settings = [_setting_row(key, spec, result.settings) for key, spec in iterate_fields()]
+    return environment.get_template("report.html.j2").render(
+        source=_source(result),
+        summary=summarise(result),
+        facts=_facts(cloud, result, rule),
+        not_measurable=NOT_MEASURABLE,
+        deformations=_deformation_table(result, place),
+        figures=_figures(cloud, result, place, progress or NoProgress()),
+        blind_spot=_blind_spot(result, rule),
+        elements=_element_table(result),
+        has_strain=any(np.isfinite(d.strain) for d in result.deformations),
+        wall_thickness=f"{result.settings.deformation.wall_thickness_mm:g} mm",
+        rule=rule,
+        settings=settings,
+        has_changes=any(s["is_changed"] for s in settings),
+        made_by=f"PipeGUI {pipecore.__version__} · all tables beside this page as CSV",
+    )
+
+
+def _source(result: Result) -> str:
+    return result.source.name if result.source else "the scan"
+
+
+def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str]]:
+    unit = result.settings.input.length_unit
+    low, high = cloud.xyz.min(axis=0), cloud.xyz.max(axis=0)
+    on_elements = np.count_nonzero(result.element_id)
+    facts = [
+        ("Date", f"{datetime.now().astimezone():%Y-%m-%d %H:%M %Z}"),
+        (
+            "Points",
+            f"{result.n_cloud_points:,}, of them {on_elements / len(cloud):.0%} on elements",
+        ),
+        ("Extent", " × ".join(f"{d:.1f}" for d in high - low) + " m"),
+        ("Coordinates", f"{cloud.crs or 'reference system not known'}, in {unit}"),
+        ("Acceptance rule", f"{rule.title} ({rule.source})"),
+    ]
+    if result.seconds:
+        facts.append(("Time taken", f"{sum(result.seconds.values()):.0f} s"))
+    return facts
+
+
+def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]:
+    columns = [
+        Column("#"),
+        Column("Element", numeric=False),
+        Column("Kind", numeric=False),
+        Column("Verdict", numeric=False),
+        Column("Depth (mm)"),
+        Column("% OD"),
+        Column("Ovality (%)"),
+        Column("Chainage (m)"),
+        Column("Clock"),
+        Column("Length × width (mm)"),
+        Column(f"Position x, y, z ({place.unit})"),
+    ]
+    has_strain = any(np.isfinite(d.strain) for d in result.deformations)
+    if has_strain:
+        columns.append(Column("Strain (%), indicative"))
+    rows = []
+    for d in by_verdict(result):
+        element = result.element(d.element_id)
+        row = [
+            str(d.deformation_id),
+            element.label,
+            d.kind,
+            d.verdict,
+            format_measure(1000 * d.depth, 1000 * d.depth_sd),
+            _depth_pct_od(d, element),
+            _ovality(d),
+            format_measure(d.chainage, decimals=2),
+            format_clock(d.clock),
+            f"{_whole_mm(d.length)} × {_whole_mm(d.width)}",
+            place.spoken(d.peak),
+        ]
+        rows.append(row + ([_number_or_blank(100 * d.strain)] if has_strain else []))
+    return {"columns": columns, "rows": rows}
+
+
+def _depth_pct_od(d: Deformation, element: Element) -> str:
+    per_od = 100 / outside_diameter(element)
+    return format_measure(per_od * d.depth, per_od * d.depth_sd)
+
+
+def _ovality(d: Deformation) -> str:
+    if d.kind is DeformationKind.OVALITY and not np.isfinite(d.ovality):
+        return NOT_MEASURABLE
+    return _number_or_blank(100 * d.ovality)
+
+
+def _number_or_blank(value: float) -> str:
+    return format_measure(value) if np.isfinite(value) else ""
+
+
+def _whole_mm(metres: float) -> str:
+    return f"{1000 * metres:.0f}" if np.isfinite(metres) else "?"
+
+
+def _element_table(result: Result) -> dict[str, Any]:
+    columns = [
+        Column("Element", numeric=False),
+        Column("Run"),
+        Column("Verdict", numeric=False),
+        Column("Nominal size", numeric=False),
+        Column("Radius (mm)"),
+        Column("Bend radius (mm), angle (°)"),
+        Column("Length (m)"),
+        Column("Arc seen (°)"),
+        Column("Residual (mm)"),
+        Column("Ovality (%)"),
+        Column("Straightness (mm)"),
+        Column("Deformations"),
+    ]
+    worst = {
+        e.element_id: min(
+            (VERDICT_ORDER.index(d.verdict) for d in result.deformations_of(e.element_id)),
+            default=len(VERDICT_ORDER),
+        )
+        for e in result.elements
+    }
+    rows = []
+    for e in sorted(result.elements, key=lambda e: (worst[e.element_id], e.element_id)):
+        rank = worst[e.element_id]
+        radius = format_measure(1000 * e.radius, 1000 * e.radius_sd)
+        if e.kind is ElementKind.CONE:
+            radius += f" → {format_measure(1000 * e.radius_end)}"
+        n_deformations = len(result.deformations_of(e.element_id))
+        rows.append(
+            [
+                e.label,
+                str(e.run_id),
+                VERDICT_ORDER[rank] if rank < len(VERDICT_ORDER) else "",
+                e.nominal.name if e.nominal else "",
+                radius,
+                _bend(e),
+                format_measure(e.axis.length, decimals=2),
+                f"{np.rad2deg(e.arc):.0f}",
+                format_measure(1000 * e.rms),
+                format_measure(100 * e.ovality, 100 * e.ovality_sd),
+                _number_or_blank(1000 * e.straightness),
+                str(n_deformations or ""),
+            ]
+        )
+    return {"columns": columns, "rows": rows}
+
+
+def _bend(element: Element) -> str:
+    axis = element.axis
+    if not isinstance(axis, ArcAxis):
+        return ""
+    return f"{1000 * axis.bend_radius:.0f}, {np.rad2deg(axis.bend_angle):.1f}"
+
+
+def _figures(
+    cloud: PointCloud, result: Result, place: FileCoordinates, progress: Progress
+) -> list[dict[str, Any]]:
+    figures = []
+    ordered = by_verdict(result)
+    for done, d in enumerate(ordered):
+        progress.update("drawing figures", done / len(ordered))
+        element = result.element(d.element_id)
+        figures.append(
+            {
+                "title": f"{d.kind.capitalize()} {d.deformation_id} on {element.label}",
+                "text": f"{format_measure(1000 * d.depth, 1000 * d.depth_sd, 'mm')} at "
+                f"chainage {d.chainage:.2f} m, {format_clock(d.clock)} o’clock, "
+                f"{place.spoken(d.peak)}",
+                "verdict": d.verdict,
+                "svg": Markup(draw_deformation(d, cloud, result)),
+            }
+        )
+    progress.update("drawing figures", 1.0)
+    return figures
+
+
+def _blind_spot(result: Result, rule: Rule) -> str:
+    """Say where the rule asks for more than was looked for."""
+    smallest = result.settings.deformation.min_depth_mm / 1000
+    small = [e for e in result.elements if dent_limit(e, rule) < smallest]
+    if not small:
+        return ""
+    return (
+        f"On {format_count(len(small), 'element')} the rule’s limit for dents lies below the "
+        f"smallest depth that was looked for ({1000 * smallest:g} mm): "
+        f"{_listed([e.label for e in small])}. That none is listed there does not clear them."
+    )
+
+
+def _listed(labels: Sequence[str], most: int = 12) -> str:
+    more = len(labels) - most
+    return ", ".join(labels[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def _setting_row(key: str, spec: FieldSpec, settings: Settings) -> dict[str, Any]:
+    value = settings.get(key)
+    if value == 0 and spec.zero_means:
+        text = spec.zero_means
+    elif isinstance(value, tuple):
+        text = "; ".join(",".join(f"{c:g}" for c in vector) for vector in value) or "none"
+    else:
+        text = f"{value:g}" if isinstance(value, float) else str(value)
+        text += f" {spec.unit}" if spec.unit else ""
+    return {
+        "label": spec.label,
+        "value": text,
+        "help": spec.help,
+        "is_changed": value != spec.default,
+    }

@@ -1,0 +1,79 @@
+"""``result.json``: all of a result but its per-point arrays, for programs.
+
+Format version 1. Lengths are metres and angles radians; positions are local
+coordinates in metres, and world coordinates in the file's unit are
+``(local + origin) / metres_per_unit``. ``null`` stands for what could not be measured.
+A kind of axis has its own keys: ``line`` has start, direction and length, ``arc`` has
+centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
+length. A reader refuses a larger `format_version`; keys may be added within a version.
+"""
+
+import dataclasses
+import json
+import math
+from datetime import UTC, datetime
+from enum import StrEnum
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import pipecore
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.types import Result
+
+FORMAT = "pipecore result"
+FORMAT_VERSION = 1
+
+
+def result_to_dict(result: Result) -> dict[str, Any]:
+    """Return a result as plain dicts, lists, strings and numbers, ready for JSON."""
+    unit = result.settings.input.length_unit
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": {"pipecore": pipecore.__version__}
+        | {name: version(name) for name in ("numpy", "scipy", "numba")},
+        "source": result.source.name if result.source else None,
+        "length_unit": str(unit),
+        "metres_per_unit": unit.metres,
+        "origin": _plain(result.origin),
+        "n_cloud_points": result.n_cloud_points,
+        "n_element_points": int(np.count_nonzero(result.element_id)),
+        "settings": result.settings.to_dict(),
+        "seconds": _plain(result.seconds),
+        "stacks": _plain(result.stacks),
+        "elements": _plain(result.elements),
+        "profiles": _plain(result.profiles),
+        "deformations": _plain(result.deformations),
+    }
+
+
+def write_result_json(path: Path, result: Result) -> None:
+    """Write ``result.json``: one line a key, so that a person can look into it too."""
+    lines = (
+        f"{json.dumps(key)}: {json.dumps(value, allow_nan=False, ensure_ascii=False)}"
+        for key, value in result_to_dict(result).items()
+    )
+    path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    """Turn the nouns of the pipeline into what JSON knows."""
+    if dataclasses.is_dataclass(value):
+        plain = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        return _AXIS_KIND.get(type(value), {}) | plain
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, StrEnum) else value
+
+
+_AXIS_KIND: dict[type, dict[str, Any]] = {LineAxis: {"kind": "line"}, ArcAxis: {"kind": "arc"}}

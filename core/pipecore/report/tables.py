@@ -1,0 +1,247 @@
+"""The CSV tables: elements, profiles, deformations.
+
+UTF-8, comma, header row, decimal points; empty where nothing could be measured or the
+column does not apply. Positions are world coordinates in the unit of the input file.
+Columns may be added; these keep name and meaning.
+"""
+
+import csv
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.geometry import ArcAxis
+from pipecore.io import write_file
+from pipecore.progress import NoProgress, Progress, in_chunks
+from pipecore.report.format import cell, format_clock, text_cell
+from pipecore.report.world import FileCoordinates
+from pipecore.rules import outside_diameter
+from pipecore.types import Array, Deformation, Element, ElementKind, Profiles, Result
+
+ELEMENT_COLUMNS = (
+    "element_id",
+    "run_id",
+    "kind",
+    "radius_mm",
+    "radius_sd_mm",
+    "radius_end_mm",
+    "nominal_size",
+    "nominal_od_mm",
+    "bend_radius_mm",
+    "bend_angle_deg",
+    "length_m",
+    "start_x",
+    "start_y",
+    "start_z",
+    "end_x",
+    "end_y",
+    "end_z",
+    "centre_x",
+    "centre_y",
+    "centre_z",
+    "n_points",
+    "n_profiles",
+    "arc_deg",
+    "rms_mm",
+    "ovality_pct",
+    "ovality_sd_pct",
+    "straightness_mm",
+    "n_deformations",
+)
+
+PROFILE_COLUMNS = (
+    "element_id",
+    "stack_id",
+    "profile_index",
+    "chainage_m",
+    "centre_x",
+    "centre_y",
+    "centre_z",
+    "semi_minor_mm",
+    "semi_major_mm",
+    "flattening",
+    "radius_mm",
+    "radius_sd_mm",
+    "ovality_pct",
+    "centre_deviation_mm",
+    "radius_deviation_mm",
+    "arc_deg",
+    "n_points",
+    "rms_mm",
+    "aic_line",
+    "aic_ellipse",
+)
+
+DEFORMATION_COLUMNS = (
+    "deformation_id",
+    "element_id",
+    "kind",
+    "chainage_m",
+    "chainage_start_m",
+    "chainage_end_m",
+    "clock",
+    "peak_x",
+    "peak_y",
+    "peak_z",
+    "depth_mm",
+    "depth_sd_mm",
+    "depth_pct_od",
+    "length_mm",
+    "width_mm",
+    "ovality_pct",
+    "strain_pct",
+    "n_points",
+    "rule",
+    "verdict",
+)
+
+ROWS_AT_A_TIME = 5_000
+
+
+def write_elements_csv(path: str | os.PathLike[str], result: Result) -> None:
+    """Write the table of elements.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written; what stood there before still does.
+    """
+    place = FileCoordinates.of(result)
+    _write(path, ELEMENT_COLUMNS, (_element_row(e, result, place) for e in result.elements))
+
+
+def write_profiles_csv(
+    path: str | os.PathLike[str], result: Result, progress: Progress | None = None
+) -> None:
+    """Write the table of profiles; errors as for `write_elements_csv`."""
+    _write(path, PROFILE_COLUMNS, _profile_rows(result, progress or NoProgress()))
+
+
+def write_deformations_csv(path: str | os.PathLike[str], result: Result) -> None:
+    """Write the table of deformations; errors as for `write_elements_csv`."""
+    place = FileCoordinates.of(result)
+    rows = (_deformation_row(d, result.element(d.element_id), place) for d in result.deformations)
+    _write(path, DEFORMATION_COLUMNS, rows)
+
+
+def _write(
+    path: str | os.PathLike[str], columns: Sequence[str], rows: Iterable[Sequence[str]]
+) -> None:
+    with (
+        write_file(path) as temporary,
+        Path(temporary).open("w", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(rows)
+
+
+def _mm(metres: float) -> str:
+    return cell(1000 * metres, 2)
+
+
+def _sd_mm(metres: float) -> str:
+    return cell(1000 * metres, 3)
+
+
+def _pct(ratio: float) -> str:
+    return cell(100 * ratio, 3)
+
+
+def _deg(radians: float) -> str:
+    return cell(float(np.rad2deg(radians)), 2)
+
+
+def _element_row(element: Element, result: Result, place: FileCoordinates) -> list[str]:
+    axis = element.axis
+    is_cone = element.kind is ElementKind.CONE
+    bend = axis if isinstance(axis, ArcAxis) else None
+    return [
+        str(element.element_id),
+        str(element.run_id),
+        element.kind,
+        _mm(element.radius),
+        _sd_mm(element.radius_sd),
+        _mm(element.radius_end) if is_cone else "",
+        text_cell(element.nominal.name) if element.nominal else "",
+        _mm(element.nominal.outside_diameter) if element.nominal else "",
+        _mm(bend.bend_radius) if bend else "",
+        _deg(bend.bend_angle) if bend else "",
+        cell(axis.length, 4),
+        *place.cells(axis.start),
+        *place.cells(axis.end),
+        *place.cells(element.centre),
+        str(element.n_points),
+        str(element.n_profiles),
+        _deg(element.arc),
+        _sd_mm(element.rms),
+        _pct(element.ovality),
+        _pct(element.ovality_sd),
+        _mm(element.straightness),
+        str(len(result.deformations_of(element.element_id))),
+    ]
+
+
+def _deformation_row(
+    deformation: Deformation, element: Element, place: FileCoordinates
+) -> list[str]:
+    return [
+        str(deformation.deformation_id),
+        str(deformation.element_id),
+        deformation.kind,
+        cell(deformation.chainage, 4),
+        cell(deformation.chainage_start, 4),
+        cell(deformation.chainage_end, 4),
+        format_clock(deformation.clock),
+        *place.cells(deformation.peak),
+        _mm(deformation.depth),
+        _sd_mm(deformation.depth_sd),
+        _pct(deformation.depth / outside_diameter(element)),
+        _mm(deformation.length),
+        _mm(deformation.width),
+        _pct(deformation.ovality),
+        _pct(deformation.strain),
+        str(deformation.n_points),
+        text_cell(deformation.rule),
+        deformation.verdict,
+    ]
+
+
+def _profile_rows(result: Result, progress: Progress) -> Iterator[tuple[str, ...]]:
+    place = FileCoordinates.of(result)
+    stage = "writing profiles"
+    for start, stop in in_chunks(len(result.profiles), ROWS_AT_A_TIME, stage, progress):
+        yield from zip(*_profile_columns(result.profiles[slice(start, stop)], place), strict=True)
+
+
+def _profile_columns(p: Profiles, place: FileCoordinates) -> list[list[str]]:
+    def column(values: Array, scale: float, decimals: int) -> list[str]:
+        return [cell(v, decimals) for v in (scale * values).tolist()]
+
+    def whole(values: NDArray[np.int32]) -> list[str]:
+        return [str(v) for v in values.tolist()]
+
+    centre = place.of_local(p.centre)
+    return [
+        whole(p.element_id),
+        whole(p.stack_id),
+        whole(p.profile_index),
+        column(p.chainage, 1, 4),
+        *(column(centre[:, i], 1, place.decimals) for i in range(3)),
+        column(p.semi_minor, 1000, 2),
+        column(p.semi_major, 1000, 2),
+        column(p.flattening, 1, 5),
+        column(p.radius, 1000, 2),
+        column(p.radius_sd, 1000, 3),
+        column(p.ovality, 100, 3),
+        column(p.centre_deviation, 1000, 2),
+        column(p.radius_deviation, 1000, 2),
+        column(np.rad2deg(p.arc), 1, 2),
+        whole(p.n_points),
+        column(p.rms, 1000, 3),
+        column(p.aic_line, 1, 2),
+        column(p.aic_ellipse, 1, 2),
+    ]
