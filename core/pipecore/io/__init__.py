@@ -1,0 +1,28 @@
+"""Reading and writing point clouds: one module a format, one registry, one result.
+
+>>> from pipecore import io
+>>> cloud = io.read("scan.e57")
+>>> io.info("scan.laz").n_points
+1000000
+
+Importing this package imports none of the libraries that read the formats.
+"""
+
+from pipecore.io.atomic import write_directory, write_file
+from pipecore.io.reading import read
+from pipecore.io.registry import Format, file_filter, formats, identify
+from pipecore.io.summary import FileInfo, info
+from pipecore.io.writing import write_laz
+
+__all__ = [
+    "FileInfo",
+    "Format",
+    "file_filter",
+    "formats",
+    "identify",
+    "info",
+    "read",
+    "write_directory",
+    "write_file",
+    "write_laz",
+]

@@ -1,0 +1,186 @@
+"""E57, by libE57 through pye57: all scans of a file, each in its pose."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pipecore.io.crs import name_in_wkt
+from pipecore.io.source import CHUNK_POINTS, Chunk, Source, damaged, told_as_read_errors
+from pipecore.types import Array
+
+_CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
+_SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_INVALID = {_CARTESIAN: "cartesianInvalidState", _SPHERICAL: "sphericalInvalidState"}
+_COLOURS = ("Red", "Green", "Blue")
+
+
+@dataclass(frozen=True, eq=False)
+class _Scan:
+    """One scan: its points' node, and what its header says."""
+
+    points: Any
+    fields: tuple[str, ...]
+    coordinates: tuple[str, str, str]
+    rotation: Array
+    translation: Array
+    has_station: bool
+    colour_limits: Array
+
+    @property
+    def n_points(self) -> int:
+        return int(self.points.childCount())
+
+
+@contextmanager
+def open_source(path: Path) -> Iterator[Source]:
+    """Open an E57 file; see `pipecore.io.registry.Format.open`."""
+    with told_as_read_errors(path, "E57"):
+        # Not pye57.E57: on an error its constructor may delete the file.
+        from pye57 import libe57  # noqa: PLC0415
+
+        image = _open_image(libe57, path)
+    try:
+        with told_as_read_errors(path, "E57"):
+            root = image.root()
+            data = root["data3D"]
+            scans = [_scan(data[i], path) for i in range(len(data))]
+            n_points = sum(scan.n_points for scan in scans)
+            # No scan stores a point in less than a bit.
+            if n_points > 8 * path.stat().st_size:
+                raise damaged(path, "E57", f"it cannot hold the {n_points:,} points it announces")
+            crs = ""
+            if root.isDefined("coordinateMetadata"):
+                crs = name_in_wkt(root["coordinateMetadata"].value())
+            stations = [scan.translation for scan in scans if scan.has_station]
+        yield Source(
+            chunks=_chunks(libe57, image, scans, path),
+            fields=tuple(dict.fromkeys(name for scan in scans for name in scan.fields)),
+            n_points=n_points,
+            crs=crs,
+            n_scans=len(scans),
+            stations=np.array(stations).reshape(-1, 3),
+        )
+    finally:
+        image.close()
+
+
+def _open_image(libe57: Any, path: Path) -> Any:
+    try:
+        return libe57.ImageFile(str(path), "r")
+    except libe57.E57Exception as error:
+        if "checksum" in str(error).lower():
+            raise damaged(path, "E57", "its checksum does not match its contents") from error
+        raise
+
+
+def _scan(node: Any, path: Path) -> _Scan:
+    from pye57 import libe57  # noqa: PLC0415
+
+    points = node["points"]
+    prototype = libe57.StructureNode(points.prototype())
+    fields = tuple(prototype.get(i).elementName() for i in range(prototype.childCount()))
+    for coordinates in (_CARTESIAN, _SPHERICAL):
+        if set(coordinates) <= set(fields):
+            break
+    else:
+        raise damaged(path, "E57", "a scan has neither Cartesian nor spherical coordinates")
+    rotation, translation = _pose(node)
+    return _Scan(
+        points,
+        fields,
+        coordinates,
+        rotation,
+        translation,
+        node.isDefined("pose") or coordinates is _SPHERICAL,
+        np.array([_colour_limits(node, prototype, f"color{c}") for c in _COLOURS]),
+    )
+
+
+def _pose(node: Any) -> tuple[Array, Array]:
+    """Return the rotation matrix and translation from a scan's frame to the file's."""
+    rotation, translation = np.eye(3), np.zeros(3)
+    if node.isDefined("pose/rotation"):
+        quaternion = np.array([node[f"pose/rotation/{k}"].value() for k in "xyzw"])
+        if quaternion.any():  # Four zeros stand for "none" in some files.
+            rotation = Rotation.from_quat(quaternion).as_matrix()
+    if node.isDefined("pose/translation"):
+        translation = np.array([node[f"pose/translation/{k}"].value() for k in "xyz"])
+    return rotation, translation
+
+
+def _colour_limits(node: Any, prototype: Any, name: str) -> tuple[float, float]:
+    """Return the values that stand for none and all of a colour."""
+    if not prototype.isDefined(name):
+        return 0.0, 255.0
+    place = f"colorLimits/{name}"
+    if node.isDefined(f"{place}Minimum") and node.isDefined(f"{place}Maximum"):
+        low = float(node[f"{place}Minimum"].value())
+        high = float(node[f"{place}Maximum"].value())
+    else:
+        kind = prototype[name]
+        is_scaled = hasattr(kind, "scaledMinimum")
+        low = float(kind.scaledMinimum() if is_scaled else kind.minimum())
+        high = float(kind.scaledMaximum() if is_scaled else kind.maximum())
+    return (low, high) if np.isfinite(high - low) and 0 < high - low < 2**32 else (0.0, 255.0)
+
+
+def _chunks(libe57: Any, image: Any, scans: list[_Scan], path: Path) -> Iterator[Chunk]:
+    with told_as_read_errors(path, "E57"):
+        n_total = sum(scan.n_points for scan in scans)
+        n_before = 0
+        for scan in scans:
+            for values, n_read in _values(libe57, image, scan):
+                yield _chunk(scan, values, (n_before + n_read) / n_total)
+            n_before += scan.n_points
+
+
+def _values(
+    libe57: Any, image: Any, scan: _Scan
+) -> Iterator[tuple[dict[str, NDArray[np.float64]], int]]:
+    """Yield the wanted values of a scan by their names, and how many are read with them."""
+    if not scan.n_points:
+        return
+    wanted = [*scan.coordinates, _INVALID[scan.coordinates], "intensity"]
+    wanted += [f"color{c}" for c in _COLOURS]
+    names = [name for name in wanted if name in scan.fields]
+    buffers = libe57.VectorSourceDestBuffer()
+    size = min(CHUNK_POINTS, scan.n_points)
+    arrays = {name: np.empty(size) for name in names}
+    for name, array in arrays.items():
+        buffers.append(libe57.SourceDestBuffer(image, name, array, size, True, True))
+    reader = scan.points.reader(buffers)
+    try:
+        n_read = 0
+        while n := reader.read():
+            n_read += n
+            yield {name: array[:n] for name, array in arrays.items()}, n_read
+    finally:
+        reader.close()
+
+
+def _chunk(scan: _Scan, values: dict[str, NDArray[np.float64]], fraction: float) -> Chunk:
+    invalid = values.get(_INVALID[scan.coordinates])
+    if invalid is not None:
+        # 1 means that only the direction is known, 2 not even that.
+        values = {name: array[invalid == 0] for name, array in values.items()}
+    a, b, c = (values[name] for name in scan.coordinates)
+    if scan.coordinates is _SPHERICAL:
+        level = a * np.cos(c)
+        a, b, c = level * np.cos(b), level * np.sin(b), a * np.sin(c)
+    xyz = np.stack([a, b, c], axis=1)
+    xyz = xyz @ scan.rotation.T + scan.translation
+    intensity = rgb = None
+    if "intensity" in values:
+        intensity = values["intensity"].astype(np.float32)
+    if all(f"color{c}" in values for c in _COLOURS):
+        low, high = scan.colour_limits.T
+        colours = np.stack([values[f"color{c}"] for c in _COLOURS], axis=1)
+        shares = np.clip(np.nan_to_num((colours - low) / (high - low)), 0.0, 1.0)
+        rgb = np.round(shares * 255).astype(np.uint8)
+    return Chunk(xyz, fraction, intensity, rgb)

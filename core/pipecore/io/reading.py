@@ -1,0 +1,192 @@
+"""From the chunks of one or several files to one cloud in one local frame."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.errors import ReadError
+from pipecore.io.registry import identify
+from pipecore.io.source import Chunk, Source
+from pipecore.progress import NoProgress, Progress
+from pipecore.settings import LengthUnit
+from pipecore.types import Array, PointCloud
+
+ORIGIN_STEP = 100.0
+"""The local zero is a whole multiple of this, metres."""
+
+FLOAT32_REACH = 1024.0
+"""Up to this far from the local zero a float32 is within 0.03 mm, metres."""
+
+FARTHEST = 1e9
+"""Coordinates beyond this (metres) lie off any map; they count as invalid, like nan."""
+
+Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
+
+
+def read(
+    paths: Paths,
+    *,
+    length_unit: LengthUnit = LengthUnit.METRE,
+    progress: Progress | None = None,
+) -> PointCloud:
+    """Read one point cloud from one or several files.
+
+    Several files are merged in one local frame; what only some of them have (colour,
+    intensity, class) is zero for the others. Points whose coordinates are not finite or
+    absurd are left out, as are those that the file marks invalid.
+
+    Parameters
+    ----------
+    paths : path or sequence of paths
+        In any format of `pipecore.io.formats`; recognised by contents, not by ending.
+    length_unit : LengthUnit
+        Unit of the coordinates in the files. Local coordinates are metres whatever it
+        is, and `cloud.world(local)` gives *metres* in the files' coordinate system:
+        divide by `length_unit.metres` to get the files' own numbers.
+    progress : Progress, optional
+        Told about the stage "reading"; may cancel.
+
+    Returns
+    -------
+    PointCloud
+        Its origin is a whole multiple of 100 m near the middle of the points; `xyz` is
+        float32 if all points lie within 1,024 m of it, else float64.
+
+    Raises
+    ------
+    ReadError
+        If a file cannot be read as a point cloud, with the file's name and the cause.
+    CancelledError
+        From `progress`.
+    """
+    files = _as_paths(paths)
+    progress = progress or NoProgress()
+    progress.update("reading", 0.0)
+    recognised = [identify(path) for path in files]
+    sizes = np.array([path.stat().st_size for path in files], dtype=np.float64)
+    starts = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
+    cloud = _GrowingCloud(length_unit.metres)
+    for i, path in enumerate(files):
+        with recognised[i].open(path) as source:
+            before = cloud.n_points
+            cloud.begin_file(source, int(sizes[i]))
+            for chunk in source.chunks:
+                cloud.add(chunk)
+                done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
+                progress.update("reading", min(float(done), 1.0))
+            if cloud.n_points == before:
+                raise ReadError(f"“{path.name}” holds no valid points.")
+    progress.update("reading", 1.0)
+    return cloud.finish(files[0])
+
+
+def _as_paths(paths: Paths) -> list[Path]:
+    files = [Path(p) for p in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
+    if not files:
+        raise ReadError("No file was given to read.")
+    return files
+
+
+class _Column:
+    """An array that grows in place; rows that are never set stay zero."""
+
+    def __init__(self, dtype: type, width: int | None = None) -> None:
+        self.array: NDArray[np.generic] = np.zeros((0,) if width is None else (0, width), dtype)
+
+    def resize(self, n_rows: int) -> None:
+        # In place (no second copy in memory); nothing else refers to the array yet.
+        self.array.resize((n_rows, *self.array.shape[1:]), refcheck=False)
+
+    def put(self, start: int, values: NDArray[np.generic]) -> None:
+        end = start + len(values)
+        if end > len(self.array):
+            self.resize(max(end, len(self.array) + len(self.array) // 2))
+        self.array[start:end] = values
+
+
+class _GrowingCloud:
+    """A cloud to which chunks are added, never held twice in memory."""
+
+    def __init__(self, metres_per_unit: float) -> None:
+        self.metres_per_unit = metres_per_unit
+        self.n_points = 0
+        self.origin: Array | None = None
+        self.xyz = _Column(np.float32, 3)
+        self.intensity: _Column | None = None
+        self.rgb: _Column | None = None
+        self.classification: _Column | None = None
+        self.stations: list[Array] = []
+        self.crs = ""
+        self.file_start = 0
+        self.has_wide_colours = False
+
+    def begin_file(self, source: Source, file_size: int) -> None:
+        """Take over what a source knows besides its points."""
+        self.file_start = self.n_points
+        self.has_wide_colours = False
+        self.crs = self.crs or source.crs
+        self.stations.append(source.stations * self.metres_per_unit)
+        if source.n_points is not None:
+            # A compressed file may announce anything: what its size makes likely is enough.
+            self.xyz.resize(self.n_points + min(source.n_points, file_size // 2))
+
+    def add(self, chunk: Chunk) -> None:
+        """Append the valid points of a chunk."""
+        xyz = chunk.xyz
+        if self.metres_per_unit != 1.0:
+            xyz = xyz * self.metres_per_unit
+        keep: NDArray[np.bool_] | slice = slice(None)
+        if len(xyz) and not (xyz.min() >= -FARTHEST and xyz.max() <= FARTHEST):
+            keep = np.all(np.abs(xyz) <= FARTHEST, axis=1)
+            xyz = xyz[keep]
+        if not len(xyz):
+            return
+        if self.origin is None:
+            self.origin = np.round(np.median(xyz, axis=0) / ORIGIN_STEP) * ORIGIN_STEP + 0.0
+        local = xyz - self.origin
+        if self.xyz.array.dtype == np.float32 and np.abs(local).max() > FLOAT32_REACH:
+            self.xyz.array = self.xyz.array.astype(np.float64)
+        self.xyz.put(self.n_points, local)
+        if chunk.intensity is not None:
+            self.intensity = self.intensity or _Column(np.float32)
+            self.intensity.put(self.n_points, chunk.intensity[keep])
+        if chunk.rgb is not None:
+            self.rgb = self.rgb or _Column(np.uint8, 3)
+            self.rgb.put(self.n_points, self._eight_bits(chunk.rgb[keep]))
+        if chunk.classification is not None:
+            self.classification = self.classification or _Column(np.uint8)
+            self.classification.put(self.n_points, chunk.classification[keep])
+        self.n_points += len(local)
+
+    def _eight_bits(self, rgb: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.uint8]:
+        """Return colours as 0 to 255, whichever bits of the 16 the file's writer used."""
+        if rgb.dtype == np.uint8:
+            return rgb.astype(np.uint8, copy=False)
+        if not self.has_wide_colours and rgb.max(initial=0) > 255:
+            self.has_wide_colours = True
+            if self.rgb is not None:  # None of this file's colours so far reached the high bits.
+                self.rgb.array[self.file_start : self.n_points] = 0
+        if not self.has_wide_colours:
+            return rgb.astype(np.uint8)
+        return (rgb >> 8).astype(np.uint8)
+
+    def finish(self, source: Path) -> PointCloud:
+        """Return the cloud; nothing can be added after that."""
+        assert self.origin is not None
+        self.xyz.resize(self.n_points)
+        for column in (self.intensity, self.rgb, self.classification):
+            if column is not None:
+                column.resize(self.n_points)
+        return PointCloud(
+            origin=self.origin,
+            xyz=self.xyz.array,  # type: ignore[arg-type]
+            intensity=self.intensity and self.intensity.array,  # type: ignore[arg-type]
+            rgb=self.rgb and self.rgb.array,  # type: ignore[arg-type]
+            classification=self.classification and self.classification.array,  # type: ignore[arg-type]
+            stations=np.concatenate(self.stations) - self.origin,
+            crs=self.crs,
+            source=source,
+        )

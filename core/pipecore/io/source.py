@@ -1,0 +1,105 @@
+"""What every format gives: a source, whose points come in chunks."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.errors import PipecoreError, ReadError
+from pipecore.types import Array
+
+CHUNK_POINTS = 250_000
+"""Points of one chunk: read in well under half a second in every binary format."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """Some points as they stand in the file.
+
+    Parameters
+    ----------
+    xyz : ndarray
+        World coordinates in the file's unit, float64, shape (m, 3); may be nan or infinite.
+    fraction : float
+        The part of the file that is read with this chunk, 0 to 1.
+    intensity : ndarray, optional
+        Shape (m,).
+    rgb : ndarray, optional
+        uint8, or uint16 of which only the whole file shows whether all bits are used;
+        shape (m, 3).
+    classification : ndarray, optional
+        uint8, shape (m,).
+    """
+
+    xyz: Array
+    fraction: float
+    intensity: NDArray[np.float32] | None = None
+    rgb: NDArray[np.uint8] | NDArray[np.uint16] | None = None
+    classification: NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """An open file: what its header says, and its points.
+
+    Parameters
+    ----------
+    chunks : iterator of Chunk
+        The points, to be taken once.
+    fields : tuple of str
+        What the file calls the values of a point.
+    n_points : int, optional
+        As the header says, held against the file's size; None if it does not say.
+    bounds : ndarray, optional
+        Lowest and highest world coordinates as the header says, shape (2, 3).
+    crs : str
+        The coordinate reference system's name, or "".
+    n_scans : int
+    stations : ndarray
+        Scanner positions, world coordinates in the file's unit, shape (k, 3).
+    """
+
+    chunks: Iterator[Chunk]
+    fields: tuple[str, ...]
+    n_points: int | None = None
+    bounds: Array | None = None
+    crs: str = ""
+    n_scans: int = 1
+    stations: Array = field(default_factory=lambda: np.empty((0, 3)))
+
+
+@contextmanager
+def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
+    """Turn whatever a format's library raises on a damaged file into a `ReadError`."""
+    try:
+        yield
+    except (PipecoreError, GeneratorExit):
+        raise
+    except MemoryError as error:
+        raise ReadError(f"“{path.name}” does not fit into memory.") from error
+    except OSError as error:
+        raise ReadError(
+            f"“{path.name}” cannot be read ({error.strerror or 'input/output error'})."
+        ) from error
+    except Exception as error:
+        raise damaged(path, format_name) from error
+    except BaseException as error:
+        # The Rust decoder of LAZ reports its own defects by an exception outside Exception.
+        if type(error).__name__ != "PanicException":
+            raise
+        raise damaged(path, format_name) from error
+
+
+def damaged(path: Path, format_name: str, cause: str = "its contents make no sense") -> ReadError:
+    """Return the error of a file that is not what its format asks for."""
+    return ReadError(f"“{path.name}” is damaged or no whole {format_name} file: {cause}.")
+
+
+def truncated(path: Path, announced: int, held: int) -> ReadError:
+    """Return the error of a file that ends too early or lies about its number of points."""
+    return ReadError(
+        f"“{path.name}” is truncated: it announces {announced:,} points but holds {held:,}."
+    )

@@ -1,0 +1,183 @@
+"""Tables of numbers in text: how their values are separated, and their rows block by block."""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from pipecore.errors import ReadError
+from pipecore.io.source import damaged
+from pipecore.types import Array
+
+BLOCK_BYTES = 2_000_000
+LONGEST_LINE = 100_000
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*([eE][-+]?\d+)?|\.\d+([eE][-+]?\d+)?|nan|inf(inity)?)", re.I)
+_COMMENT = ("#", "//")
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How the values of a line are separated.
+
+    Parameters
+    ----------
+    delimiter : str, optional
+        None for white space.
+    has_decimal_commas : bool
+    """
+
+    delimiter: str | None = None
+    has_decimal_commas: bool = False
+
+    def split(self, line: str) -> list[str]:
+        """Return the values of a line of data as `float` reads them."""
+        if self.has_decimal_commas:
+            line = line.replace(",", ".")
+        values = [v.strip().strip('"') for v in line.strip().split(self.delimiter)]
+        # A delimiter at the end of the line closes the last value and opens no further one.
+        return values[:-1] if self.delimiter and values[-1] == "" else values
+
+
+def sniff_dialect(lines: Sequence[str]) -> Dialect:
+    """Return how the values of some lines of data are separated."""
+    text = "\n".join(lines)
+    if ";" in text:
+        return Dialect(";", has_decimal_commas="," in text)
+    if "," not in text:
+        return Dialect()
+    # “1,5 2,5 3,5” against “1.5, 2.5, 3.5” and “1,2,3”.
+    decimal = re.compile(r'"?[-+]?\d*,\d+([eE][-+]?\d+)?"?|[-+]?\d+')
+    rows = [line.split() for line in lines]
+    if all(len(row) >= 3 and all(decimal.fullmatch(v) for v in row) for row in rows):
+        return Dialect(None, has_decimal_commas=True)
+    return Dialect(",")
+
+
+def is_number(value: str) -> bool:
+    """Tell whether a value can be read as a number."""
+    return _NUMBER.fullmatch(value) is not None
+
+
+def is_comment(line: str) -> bool:
+    """Tell whether a line holds nothing or only a remark."""
+    return not line.strip() or line.lstrip().startswith(_COMMENT)
+
+
+def is_count(line: str) -> bool:
+    """Tell whether a line holds nothing but a number of points, as a PTS file's first does."""
+    return re.fullmatch(r"\s*\d{1,18}\s*", line) is not None
+
+
+@dataclass
+class Table:
+    """The rows of numbers that follow in an open file.
+
+    Parameters
+    ----------
+    file : binary file
+        Positioned at the first row.
+    path : Path
+        Its name, for errors.
+    dialect : Dialect
+    columns : tuple of int
+        Those to read; the others may hold anything.
+    n_columns : int
+        Of every row.
+    n_lines_before : int
+        Lines above the first row, so that errors can name lines.
+    n_rows : int, optional
+        How many rows belong to the table; None for all.
+    has_counts : bool
+        Whether lines with a number of points may stand between the rows.
+    """
+
+    file: BinaryIO
+    path: Path
+    dialect: Dialect
+    columns: tuple[int, ...]
+    n_columns: int
+    n_lines_before: int = 0
+    n_rows: int | None = None
+    has_counts: bool = False
+    n_announced: int = 0
+    """Points announced by the count lines between the rows met so far."""
+
+    def blocks(self) -> Iterator[Array]:
+        """Yield the rows, float64, shape (any, len(columns)).
+
+        Raises
+        ------
+        ReadError
+            Naming the line that is no row of numbers.
+        """
+        n_lines, n_left = self.n_lines_before, self.n_rows
+        for lines in self._lines():
+            wanted = lines
+            if n_left is not None:
+                wanted = lines[:n_left]
+                n_left -= len(wanted)
+            yield self._parse(wanted, n_lines)
+            n_lines += len(lines)
+            if n_left == 0:
+                return
+
+    def _lines(self) -> Iterator[list[str]]:
+        rest = b""
+        while block := self.file.read(BLOCK_BYTES):
+            # Latin-1 cannot fail, and what is no number is no number in any encoding.
+            lines = (rest + block).splitlines()
+            rest = b"" if block.endswith((b"\n", b"\r")) else lines.pop()
+            if len(rest) > LONGEST_LINE:
+                raise damaged(self.path, "text", f"a line is over {LONGEST_LINE:,} characters long")
+            yield [line.decode("latin-1") for line in lines]
+        if rest:
+            yield [rest.decode("latin-1")]
+
+    def _parse(self, lines: list[str], n_lines_before: int) -> Array:
+        try:
+            return self._numbers(lines)
+        except ValueError:
+            # Something is no row of numbers: find it, one by one.
+            rows = []
+            for i, line in enumerate(lines):
+                if is_comment(line):
+                    continue
+                if self.has_counts and is_count(line):
+                    self.n_announced += int(line)
+                    continue
+                values = self.dialect.split(line)
+                if len(values) != self.n_columns or not all(
+                    is_number(values[c]) for c in self.columns
+                ):
+                    raise ReadError(
+                        f"“{self.path.name}”: line {n_lines_before + i + 1} is no point with "
+                        f"{self.n_columns} values: “{_shortened(line)}”."
+                    ) from None
+                rows.append([float(values[c]) for c in self.columns])
+            return np.array(rows, dtype=np.float64).reshape(-1, len(self.columns))
+
+    def _numbers(self, lines: list[str]) -> Array:
+        if not any(line and not line.isspace() for line in lines[:1000]):
+            raise ValueError("nothing to read")
+        if self.dialect.has_decimal_commas:
+            lines = [line.replace(",", ".") for line in lines]
+        # Without `usecols` numpy also holds that all rows are equally long.
+        is_whole_row = len(self.columns) == self.n_columns
+        return np.loadtxt(
+            lines,
+            dtype=np.float64,
+            comments=None,
+            delimiter=self.dialect.delimiter,
+            usecols=None if is_whole_row else self.columns,
+            quotechar='"',
+            ndmin=2,
+        )[:, : None if is_whole_row else len(self.columns)].reshape(-1, len(self.columns))
+
+
+def _shortened(line: str) -> str:
+    line = "".join(c if c.isprintable() else "·" for c in line.strip())
+    return line if len(line) <= 40 else line[:39] + "…"
