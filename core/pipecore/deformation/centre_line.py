@@ -1,0 +1,80 @@
+"""Bow and kink: the line of centres against its chord."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipecore.deformation.reference import Contour
+from pipecore.geometry import Array
+
+KINK_ADVANTAGE = 20.0
+"""How much lower the AIC of two straight pieces must be than that of a parabola."""
+
+MIN_KINK = np.deg2rad(0.3)
+MIN_BOW_RATIO = 0.001
+"""A pipe counts as bowed from 3.2 mm in 3 m (ASTM A999)."""
+
+
+@dataclass(frozen=True)
+class CentreLine:
+    """How far the measured axis leaves its chord, at most.
+
+    `chainage` and `clock` say where and to which side, `is_kink` whether it changes
+    direction there at once.
+    """
+
+    straightness: float
+    straightness_sd: float
+    chainage: float
+    clock: float
+    is_kink: bool
+
+
+def measure_centre_line(contour: Contour, inflation: float) -> CentreLine:
+    """Measure a contour fitted with a constant radius against the chord of its ends."""
+    s = contour.grid.chainages
+    offset = contour.terms[:, 1:3]
+    deviation = offset - _chord(s, offset)
+    distance = np.hypot(deviation[:, 0], deviation[:, 1])
+    peak = int(np.argmax(distance))
+    side = deviation[peak] / max(distance[peak], 1e-12)
+    # The chord's ends are as uncertain as the peak: add their shares.
+    share = s[peak] / contour.grid.length
+    covariance = contour.term_covariance[:, 1:3, 1:3]
+    variance = [float(side @ covariance[i] @ side) for i in (peak, 0, -1)]
+    sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
+    return CentreLine(
+        float(distance[peak]),
+        float(sd) * inflation,
+        float(s[peak]),
+        float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi)),
+        _is_kink(s, deviation @ side, covariance, side),
+    )
+
+
+def _chord(s: Array, offset: Array) -> Array:
+    share = ((s - s[0]) / (s[-1] - s[0]))[:, None]
+    return np.asarray(offset[0] * (1 - share) + offset[-1] * share)
+
+
+def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
+    """Whether two straight pieces fit the line of centres better than a parabola."""
+    step = max(1, len(s) // 40)
+    s, lateral = s[::step], lateral[::step]
+    if len(s) < 8:
+        return False
+    sd = np.sqrt(np.einsum("k,rkl,l->r", side, covariance[::step], side))
+    x = (s - s[0]) / (s[-1] - s[0])
+
+    def chi2(columns: list[Array]) -> tuple[float, Array]:
+        design = np.stack(columns, axis=1) / sd[:, None]
+        solution, *_ = np.linalg.lstsq(design, lateral / sd, rcond=None)
+        return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
+
+    parabola, _ = chi2([np.ones_like(x), x, x**2])
+    best, angle = np.inf, 0.0
+    for knee in x[2:-2]:
+        value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
+        if value < best:
+            best, angle = value, abs(float(solution[2])) / (s[-1] - s[0])
+    return bool(best + 2 + KINK_ADVANTAGE < parabola and angle > MIN_KINK)

@@ -1,0 +1,247 @@
+"""From the points around one element to its deformations: the steps in their order."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.deformation.centre_line import MIN_BOW_RATIO, measure_centre_line
+from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
+from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
+from pipecore.deformation.patches import Patch, find_patches
+from pipecore.deformation.reference import Contour, fit_contour, usable_arc
+from pipecore.deformation.strain import dent_strain
+from pipecore.deformation.surface import Surface, own_surface
+from pipecore.deformation.unrolled import surface_distance, unroll
+from pipecore.geometry import Array, LineAxis, surface_points
+from pipecore.settings import DeformationSettings
+from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind, Profiles
+
+SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
+"""Kinds whose contour is known well enough to look for deformations."""
+
+STRAIN_SIGNIFICANCE = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class DeformationFinding:
+    """What was found on one element.
+
+    Parameters
+    ----------
+    deformations : tuple of Deformation
+        In order of chainage; ids and verdicts are given later.
+    deviation : ndarray of float32, shape (n,)
+        Signed distance of every point from the undeformed contour, metres, outward
+        positive; nan for points that are not of the surface.
+    belongs : ndarray of bool, shape (n,)
+    map : DeviationMap, optional
+        None where there are too few points.
+    ovality, ovality_sd : float
+        Of the mean section, ratios; nan where the arc cannot carry it.
+    straightness : float
+        Largest distance of the measured axis from its chord, metres; nan if unknown.
+    """
+
+    deformations: tuple[Deformation, ...]
+    deviation: NDArray[np.float32]
+    belongs: Flags
+    map: DeviationMap | None
+    ovality: float = np.nan
+    ovality_sd: float = np.nan
+    straightness: float = np.nan
+
+
+def find_deformations(
+    element: Element,
+    xyz: Array,
+    normals: Array,
+    neighbours: Sequence[Element],
+    profiles: Profiles,
+    settings: DeformationSettings,
+) -> DeformationFinding:
+    """Find and measure the deformations of one element.
+
+    Parameters
+    ----------
+    element : Element
+    xyz, normals : ndarray, shape (n, 3)
+        All points of the wide neighbourhood (0.4 to 1.3 radii from the axis), clutter
+        included, with unit normals of either sign, nan where not known.
+    neighbours : sequence of Element
+        Elements whose surfaces come near: where they touch, nothing is called a bulge.
+    profiles : Profiles
+        The element's own profiles.
+    settings : DeformationSettings
+    """
+    points = unroll(element, xyz, normals)
+    surface = own_surface(element, points)
+    if surface is None:
+        return DeformationFinding(
+            (), np.full(len(xyz), np.nan, np.float32), np.zeros(len(xyz), bool), None
+        )
+    heights = _height_map(element, surface, neighbours)
+    n_terms = 5 if usable_arc(surface.grid, heights.covered) >= MIN_ARC else 3
+    patches, contour = find_patches(element, surface, heights, n_terms, settings.significance)
+
+    deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
+    deformations = [d for d in deformations if d.depth >= settings.min_depth_mm / 1000]
+    ovality = ovality_sd = np.nan
+    if n_terms == 5:
+        ovality, ovality_sd = mean_ovality(contour)
+        stretches = oval_stretches(contour, settings.min_ovality_pct / 100, 1.0)
+        deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
+    straightness = np.nan
+    if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
+        straightness, bow = _measure_bow(element, surface, heights, patches, n_terms, settings)
+        deformations += bow
+
+    deviation = np.full(len(xyz), np.nan, np.float32)
+    own = surface.belongs
+    at_point = surface.grid.interpolate(contour.height, points.chainage[own], points.clock[own])
+    deviation[own] = points.height[own] - at_point
+    if element.kind not in SEARCHED:
+        deformations = []
+    return DeformationFinding(
+        tuple(sorted(deformations, key=lambda d: (d.chainage, d.kind))),
+        deviation,
+        own,
+        replace(heights, deviation=heights.deviation - contour.height),
+        ovality,
+        ovality_sd,
+        straightness,
+    )
+
+
+def _height_map(element: Element, surface: Surface, neighbours: Sequence[Element]) -> DeviationMap:
+    """Cell means above the fitted surface, with the cells where others touch it."""
+    grid, own = surface.grid, surface.belongs
+    cell = surface.cell[own]
+    count = grid.count(cell)
+    disputed = surface.foreign.copy()
+    if neighbours:
+        chainage, clock = (
+            a.ravel() for a in np.meshgrid(grid.chainages, grid.clocks, indexing="ij")
+        )
+        places = surface_points(element.axis, chainage, element.radius_at(chainage), clock)
+        reach = max(2 * grid.row_size, 0.01)
+        for other in neighbours:
+            disputed |= (surface_distance(other, places) < reach).reshape(grid.shape)
+    return DeviationMap(
+        grid, grid.mean(cell, surface.points.height[own]), surface.noise, count, disputed
+    )
+
+
+def _as_deformation(
+    element: Element,
+    surface: Surface,
+    contour: Contour,
+    patch: Patch,
+    settings: DeformationSettings,
+) -> Deformation:
+    grid, bump = surface.grid, patch.bump
+    depth = abs(bump.height)
+    radius = float(element.radius_at(patch.chainage))
+    inside = patch.cells(grid).ravel()[surface.cell] & surface.belongs
+    strain = np.nan
+    wall = settings.wall_thickness_mm / 1000
+    if wall > 0 and bump.height < 0 and depth >= STRAIN_SIGNIFICANCE * bump.height_sd:
+        strain = dent_strain(
+            depth, bump.length, bump.curvature_along, bump.curvature_around, radius, wall
+        )
+    return Deformation(
+        deformation_id=NO_ID,
+        element_id=element.element_id,
+        kind=DeformationKind.DENT if bump.height < 0 else DeformationKind.BULGE,
+        chainage=patch.chainage,
+        chainage_start=max(patch.chainage - bump.length / 2, 0.0),
+        chainage_end=min(patch.chainage + bump.length / 2, element.axis.length),
+        clock=patch.clock,
+        peak=_peak(element, contour, patch.chainage, patch.clock, bump.height),
+        depth=depth,
+        depth_sd=bump.height_sd,
+        length=bump.length,
+        width=bump.width,
+        strain=strain,
+        n_points=int(np.count_nonzero(inside)),
+        significance=abs(patch.z),
+    )
+
+
+def _oval_deformation(
+    element: Element, surface: Surface, contour: Contour, oval: OvalStretch
+) -> Deformation:
+    """An oval stretch; its depth is how far the section leaves the circle."""
+    grid = surface.grid
+    row = surface.cell[surface.belongs] // grid.n_columns
+    chainage = float(grid.chainages[oval.peak])
+    return Deformation(
+        deformation_id=NO_ID,
+        element_id=element.element_id,
+        kind=DeformationKind.OVALITY,
+        chainage=chainage,
+        chainage_start=oval.first * grid.row_size,
+        chainage_end=(oval.last + 1) * grid.row_size,
+        clock=oval.clock,
+        peak=_peak(element, contour, chainage, oval.clock, 0.0),
+        depth=oval.ovality * grid.radius / 2,
+        depth_sd=oval.ovality_sd * grid.radius / 2,
+        length=(oval.last + 1 - oval.first) * grid.row_size,
+        width=2 * np.pi * grid.radius,
+        ovality=oval.ovality,
+        n_points=int(np.count_nonzero((row >= oval.first) & (row <= oval.last))),
+        significance=oval.z,
+    )
+
+
+def _measure_bow(
+    element: Element,
+    surface: Surface,
+    heights: DeviationMap,
+    patches: list[Patch],
+    n_terms: int,
+    settings: DeformationSettings,
+) -> tuple[float, list[Deformation]]:
+    """Straightness, and the bow or kink if it is one."""
+    grid = surface.grid
+    used = heights.count > 0
+    for patch in patches:
+        used &= ~patch.cells(grid, 1.15)
+    variance = np.where(used, heights.noise**2 / np.maximum(heights.count, 1), np.inf)
+    contour = fit_contour(
+        grid, heights.deviation, variance, n_terms, knot_diameters=4.0, constant_radius=True
+    )
+    line = measure_centre_line(contour, 1.0)
+    least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
+    if line.straightness_sd > settings.min_depth_mm / 1000:
+        return np.nan, []
+    if line.straightness < max(least, settings.significance * line.straightness_sd):
+        return line.straightness, []
+    deformation = Deformation(
+        deformation_id=NO_ID,
+        element_id=element.element_id,
+        kind=DeformationKind.KINK if line.is_kink else DeformationKind.BOW,
+        chainage=line.chainage,
+        chainage_start=0.0,
+        chainage_end=grid.length,
+        clock=line.clock,
+        peak=_peak(element, contour, line.chainage, line.clock, 0.0),
+        depth=line.straightness,
+        depth_sd=line.straightness_sd,
+        length=grid.length,
+        width=2 * grid.radius,
+        n_points=int(np.count_nonzero(surface.belongs)),
+        significance=line.straightness / line.straightness_sd,
+    )
+    return line.straightness, [deformation]
+
+
+def _peak(
+    element: Element, contour: Contour, chainage: float, clock: float, height: float
+) -> Array:
+    """The point on the deformed surface at a place, shape (3,)."""
+    grid: Grid = contour.grid
+    undeformed = grid.interpolate(contour.height, np.array([chainage]), np.array([clock]))
+    radius = float(element.radius_at(chainage)) + float(undeformed[0]) + height
+    return surface_points(element.axis, chainage, radius, clock)

@@ -1,0 +1,99 @@
+"""Ovality: the second harmonic of the contour along the pipe."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipecore.deformation.reference import Contour
+from pipecore.geometry import Array
+
+MIN_ARC = np.deg2rad(200.0)
+"""Below this the second harmonic cannot be told from a shift of the centre."""
+
+CLEAR = 4.0
+"""A stretch is oval if its ovality is this many times its standard deviation."""
+
+
+@dataclass(frozen=True)
+class OvalStretch:
+    """Rows [first, last] of a grid that are oval, with the largest ovality among them.
+
+    `ovality` and `ovality_sd` are ratios, (Dmax - Dmin) / Dnom; `clock` is where the
+    section is widest.
+    """
+
+    first: int
+    last: int
+    peak: int
+    ovality: float
+    ovality_sd: float
+    clock: float
+    z: float
+
+
+def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
+    """Ovality (ratio), its standard deviation and the clock of the widest place, per row.
+
+    The noise alone gives a positive amplitude; what it adds on average is taken off.
+    """
+    a2, b2 = contour.terms[:, 3], contour.terms[:, 4]
+    variance = np.trace(contour.term_covariance[:, 3:5, 3:5], axis1=1, axis2=2) / 2
+    amplitude = np.sqrt(np.maximum(a2**2 + b2**2 - variance, 0.0))
+    to_ratio = 2.0 / contour.grid.radius
+    clock = np.mod(np.arctan2(b2, a2) / 2, 2 * np.pi)
+    return amplitude * to_ratio, np.sqrt(variance) * to_ratio, clock
+
+
+def mean_ovality(contour: Contour) -> tuple[float, float]:
+    """Ovality of the mean section of the element and its standard deviation, ratios."""
+    pull = contour.basis.mean(axis=0)
+    mean = (pull @ contour.coefficients)[3:5]
+    covariance = np.einsum("a,akbl,b->kl", pull, contour.covariance, pull)[3:5, 3:5]
+    variance = float(np.trace(covariance)) / 2
+    amplitude = np.sqrt(max(float(mean @ mean) - variance, 0.0))
+    to_ratio = 2.0 / contour.grid.radius
+    return float(amplitude * to_ratio), float(np.sqrt(variance) * to_ratio)
+
+
+def oval_stretches(contour: Contour, min_ovality: float, inflation: float) -> list[OvalStretch]:
+    """Return stretches at least one diameter long whose ovality reaches `min_ovality`.
+
+    A stretch goes on where the ovality stays above half of `min_ovality`.
+    """
+    ovality, sd, clock = ovality_along(contour)
+    sd = sd * inflation
+    found = []
+    for first, last in runs((ovality > 0.5 * min_ovality) & (sd < min_ovality)):
+        peak = first + int(np.argmax(ovality[first : last + 1]))
+        long_enough = (last + 1 - first) * contour.grid.row_size >= 2 * contour.grid.radius
+        clear = ovality[peak] > max(CLEAR * sd[peak], min_ovality)
+        if long_enough and clear:
+            # The strongest value of many reads high: the stretch's upper quarter is its ovality.
+            strong = first + np.flatnonzero(
+                ovality[first : last + 1] >= np.quantile(ovality[first : last + 1], 0.75)
+            )
+            value = float(np.mean(ovality[strong]))
+            found.append(
+                OvalStretch(
+                    first,
+                    last,
+                    peak,
+                    value,
+                    float(sd[peak]),
+                    float(clock[peak]),
+                    float(ovality[peak] / sd[peak]),
+                )
+            )
+    return found
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of each run of true values."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    return list(
+        zip(
+            np.flatnonzero(edges == 1).tolist(),
+            (np.flatnonzero(edges == -1) - 1).tolist(),
+            strict=True,
+        )
+    )

@@ -1,0 +1,147 @@
+"""Which of the points around an element lie on its own surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from pipecore.deformation.deviation_map import (
+    Flags,
+    Grid,
+    box_sum,
+    group_median,
+    local_noise,
+    point_spacing,
+)
+from pipecore.deformation.reference import fit_contour
+from pipecore.deformation.unrolled import Unrolled
+from pipecore.geometry import Array
+from pipecore.types import Element
+
+INWARD_REACH, OUTWARD_REACH = 0.5, 0.25
+"""How far from the fitted surface deformations are looked for, shares of the radius."""
+
+MIN_ALIGNMENT = np.cos(np.deg2rad(50.0))
+"""The flank of the steepest dent (35°) with a noisy normal (5°, three times)."""
+
+STEEPEST_FLANK = np.tan(np.deg2rad(35.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """The own surface of an element within its neighbourhood.
+
+    Parameters
+    ----------
+    grid : Grid
+    points : Unrolled
+        All the points of the neighbourhood, n of them.
+    belongs : ndarray of bool, shape (n,)
+    cell : ndarray of int, shape (n,)
+        Flat index of each point's cell.
+    noise : ndarray, shape (rows, columns)
+        Standard deviation of one point, metres.
+    foreign : ndarray of bool, shape (rows, columns)
+        Cells where points of something else lie close over the surface.
+    """
+
+    grid: Grid
+    points: Unrolled
+    belongs: Flags
+    cell: np.ndarray
+    noise: Array
+    foreign: Flags
+
+
+def own_surface(element: Element, points: Unrolled) -> Surface | None:
+    """Find the points on an element's surface; None if there are too few to say.
+
+    It starts from cells at the robustly fitted contour and grows into neighbouring
+    cells as long as the surface goes on without a step: down into dents and up
+    bulges, but not over to things that merely stand near.
+    """
+    radius = (element.radius + element.radius_end) / 2
+    length = element.axis.length
+    near = (points.chainage > -0.05 * radius) & (points.chainage < length + 0.05 * radius)
+    near &= (points.height > -INWARD_REACH * radius) & (points.height < OUTWARD_REACH * radius)
+    facing = near & ~(points.alignment < MIN_ALIGNMENT)
+    band = max(4 * min(element.rms, 0.03 * radius), 0.02 * radius)
+    core = facing & (np.abs(points.height) < band)
+    if np.count_nonzero(core) < 30:
+        return None
+    grid = Grid.for_element(
+        element, point_spacing(element, points.chainage[core], points.clock[core])
+    )
+    cell = grid.cell_of(points.chainage, points.clock)
+
+    sigma = local_noise(grid, cell[core], points.height[core])
+    contour = _first_contour(grid, points, cell, facing, sigma)
+    level = points.height - contour.ravel()[cell]
+    noise = sigma.ravel()[cell]
+
+    value = _grow(grid, level, noise, cell, facing)
+    slope = _steepness(value)
+    reached = np.isfinite(value).ravel()[cell]
+    local = np.where(reached, value.ravel()[cell], 0.0)
+    tolerance = 4 * noise + slope.ravel()[cell]
+    belongs = facing & reached & (np.abs(level - local) < tolerance)
+    # A stray point makes a cell of its own: the surface has company.
+    company = box_sum(grid.count(cell[belongs]))
+    belongs &= company.ravel()[cell] >= 3
+
+    above = near & ~belongs & (level > 4 * noise) & (level > local + tolerance)
+    foreign = grid.count(cell[above]) >= 2
+    sigma = local_noise(grid, cell[belongs], points.height[belongs])
+    return Surface(grid, points, belongs, cell, sigma, foreign)
+
+
+def _first_contour(
+    grid: Grid, points: Unrolled, cell: np.ndarray, facing: Flags, sigma: Array
+) -> Array:
+    """Contour through the medians of cells, whatever else is in some of them."""
+    n_cells = grid.n_rows * grid.n_columns
+    median, n = group_median(cell[facing], points.height[facing], n_cells)
+    median, n = median.reshape(grid.shape), n.reshape(grid.shape)
+    variance = np.where(n > 0, 1.6 * sigma**2 / np.maximum(n, 1), np.inf)
+    return fit_contour(grid, median, variance, 3).height
+
+
+def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flags) -> Array:
+    """Level of the own surface per cell above the contour, nan where it does not reach."""
+    at_contour = facing & (np.abs(level) < 3 * noise)
+    value = grid.mean(cell[at_contour], level[at_contour])
+    # Where most points of a cell lie off the contour, the surface has left it.
+    strays = grid.count(cell[facing]) - grid.count(cell[at_contour])
+    value[strays > grid.count(cell[at_contour])] = np.nan
+    step = STEEPEST_FLANK * max(grid.row_size, grid.column_size)
+
+    open_points = np.flatnonzero(facing)
+    for _ in range(max(grid.shape)):
+        known = np.isfinite(value)
+        weight = box_sum(known * 1.0)
+        predicted = box_sum(np.where(known, value, 0.0)) / np.maximum(weight, 1)
+        # Sparse scans leave cells empty: look one further where the nearest know nothing.
+        weight_2 = box_sum(known * 1.0, 2)
+        further = box_sum(np.where(known, value, 0.0), 2) / np.maximum(weight_2, 1)
+        predicted = np.where(weight > 0, predicted, further)
+        reachable = ~known & (weight_2 > 0)
+        open_points = open_points[~known.ravel()[cell[open_points]]]
+        at = cell[open_points]
+        gap = np.abs(level[open_points] - predicted.ravel()[at])
+        # The prediction is the mean of cells up to two steps away.
+        fits = reachable.ravel()[at] & (gap < 3 * noise[open_points] + 1.5 * step)
+        if not fits.any():
+            break
+        chosen = open_points[fits]
+        gained = grid.mean(cell[chosen], level[chosen])
+        value = np.where(known, value, gained)
+    return value
+
+
+def _steepness(value: Array) -> Array:
+    """How much the surface rises within a cell, metres; 0 where it cannot be told."""
+    around = np.pad(value, ((1, 1), (0, 0)), constant_values=np.nan)
+    along = np.abs(around[2:] - around[:-2]) / 2
+    across = np.abs(np.roll(value, -1, axis=1) - np.roll(value, 1, axis=1)) / 2
+    rise = np.nan_to_num(along) + np.nan_to_num(across)
+    return np.asarray(ndimage.maximum_filter(rise, 3, mode=("nearest", "wrap")))
