@@ -47,6 +47,8 @@ def open_source(path: Path) -> Iterator[Source]:
                 | wanted.RGB,
             )
             header = reader.header
+            if header.are_points_compressed and header.point_count:
+                _check_chunks(file, path, header)
             bounds = np.array([header.mins, header.maxs])
         yield Source(
             chunks=_chunks(reader, path),
@@ -138,6 +140,23 @@ def _check_chunk_table(file: BinaryIO, path: Path, start: int, size: int) -> Non
         raise damaged(path, "LAZ", "its table of chunks makes no sense")
 
 
+def _check_chunks(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> None:
+    """Refuse chunks that are larger than the file before the decoder makes room for them."""
+    import lazrs  # noqa: PLC0415
+
+    packing = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
+    if packing.item_size() != header.point_format.size:
+        raise damaged(path, "LAZ", "the size of its points contradicts itself")
+    file.seek(header.offset_to_point_data)
+    chunks = lazrs.read_chunk_table(file, packing)
+    if sum(n_bytes for _, n_bytes in chunks) > path.stat().st_size:
+        raise damaged(path, "LAZ", "it is truncated")
+    n_held = sum(n_points for n_points, _ in chunks)
+    if header.point_count > n_held:
+        raise truncated(path, header.point_count, n_held)
+    file.seek(header.offset_to_point_data)
+
+
 _KEY_DIRECTORY, _KEY_TEXTS = 34735, 34737
 _PROJECTED_CODE, _CITATIONS = 3072, (3073, 1026)
 
@@ -158,7 +177,7 @@ def _crs_name(header: "laspy.LasHeader") -> str:
     texts: str = records.get(_KEY_TEXTS, b"").decode("latin-1")
     for citation in _CITATIONS:
         where, n, at = keys.get(citation, (0, 0, 0))
-        name = texts[at : at + n].split("|")[0].strip("\0 ")
+        name = texts[at : at + n].split("|", maxsplit=1)[0].strip("\0 ")
         if where == _KEY_TEXTS and name:
             return name
     code = keys.get(_PROJECTED_CODE, (0, 0, 0))[2]
