@@ -83,10 +83,7 @@ class Criterion:
             Measure.OVALITY_MM: 1000 * diameter,
         }[self.measure]
         if self.measure in (Measure.OVALITY_PCT, Measure.OVALITY_MM):
-            # Depth and ovality of one stretch are the same amplitude in two forms.
-            depth, depth_sd = deformation.depth, deformation.depth_sd
-            relative_sd = depth_sd / depth if depth > 0 else np.nan
-            return scale * deformation.ovality, scale * deformation.ovality * relative_sd
+            return scale * deformation.ovality, scale * ovality_sd(deformation)
         return scale * deformation.depth, scale * deformation.depth_sd
 
     def judge(self, deformation: Deformation, element: Element) -> Verdict:
@@ -129,6 +126,17 @@ class Rule:
 def outside_diameter(element: Element) -> float:
     """Outside diameter that limits in percent refer to: the nominal one where known, metres."""
     return element.nominal.outside_diameter if element.nominal else 2 * element.radius
+
+
+def ovality_sd(deformation: Deformation) -> float:
+    """Standard deviation of a deformation's ovality, as a ratio.
+
+    Depth and ovality of one stretch are the same amplitude in two forms, and so have the
+    same relative uncertainty.
+    """
+    if not deformation.depth > 0:
+        return np.nan
+    return deformation.ovality * deformation.depth_sd / deformation.depth
 
 
 def judge(deformation: Deformation, element: Element, rule: Rule) -> Verdict:

@@ -43,8 +43,9 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "pipecore",
 }
-MAP_CELLS_AROUND = 60
-SECTION_HALF_WIDTH = 0.02
+FINEST_CELLS_AROUND = 60
+POINTS_PER_CELL = 6
+SECTION_CELLS = 72
 
 
 def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result) -> str:
@@ -53,6 +54,7 @@ def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.4, 2.3), layout="constrained")
         left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+        left.patch.set_visible(False)
         _draw_radius(left, deformation, element, result)
         if deformation.kind in (DeformationKind.DENT, DeformationKind.BULGE):
             _draw_map(right, deformation, element, cloud, result)
@@ -61,7 +63,7 @@ def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result
         else:
             _draw_centres(right, deformation, element, result)
         text = io.StringIO()
-        figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
+        figure.savefig(text, format="svg", facecolor="none", metadata={"Date": None})
     svg = text.getvalue()
     return svg[svg.index("<svg") :]
 
@@ -112,11 +114,13 @@ def _draw_map(
     high = min(element.axis.length, deformation.chainage + reach)
     # The deformation stands in the middle of the map, wherever it is on the clock.
     around = np.mod(clock - deformation.clock + np.pi, 2 * np.pi) - np.pi
-    cell = 2 * np.pi * element.radius / MAP_CELLS_AROUND
-    bins = [max(1, round((high - low) / cell)), MAP_CELLS_AROUND]
-    box = [[low, high], [-np.pi, np.pi]]
-    valid = np.isfinite(deviation)
-    where: dict[str, Any] = {"bins": bins, "range": box}
+    valid = np.isfinite(deviation) & (chainage >= low) & (chainage <= high)
+    n_around = _cells_around(int(valid.sum()), high - low, element)
+    cell = 2 * np.pi * element.radius / n_around
+    where: dict[str, Any] = {
+        "bins": [max(1, round((high - low) / cell)), n_around],
+        "range": [[low, high], [-np.pi, np.pi]],
+    }
     count = np.histogram2d(chainage[valid], around[valid], **where)[0]
     total = np.histogram2d(chainage[valid], around[valid], weights=deviation[valid], **where)[0]
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
@@ -139,6 +143,13 @@ def _draw_map(
     axes.figure.colorbar(image, ax=axes, ticks=[-limit, 0, limit], pad=0.02, aspect=12)
 
 
+def _cells_around(n_points: int, length: float, element: Element) -> int:
+    """Number of square cells around the pipe that leaves some points in each that is seen."""
+    seen_area = length * element.radius * max(element.arc, 0.1)
+    cell = np.sqrt(POINTS_PER_CELL * seen_area / max(n_points, 1))
+    return int(np.clip(2 * np.pi * element.radius / cell, 12, FINEST_CELLS_AROUND))
+
+
 def _set_clock_ticks(axes: Axes, middle: float) -> None:
     hours = np.arange(0, 2 * np.pi, np.pi / 2)
     ticks = np.mod(hours - middle + np.pi, 2 * np.pi) - np.pi
@@ -149,24 +160,39 @@ def _draw_section(
     axes: Axes, deformation: Deformation, element: Element, cloud: PointCloud, result: Result
 ) -> None:
     chainage, clock, deviation = _points_of(element, cloud, result)
-    near = np.abs(chainage - deformation.chainage) < SECTION_HALF_WIDTH
-    near &= np.isfinite(deviation)
+    half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
+    near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
+    angle, mean = _means_around(clock[near], deviation[near])
     radius = float(element.radius_at(deformation.chainage))
     # So exaggerated that the deviation is a fifth of the radius, by a round factor.
     exaggeration = max(1, round(radius / 5 / max(deformation.depth, 1e-3)))
     circle = np.linspace(0, 2 * np.pi, 181)
-    axes.plot(1000 * radius * np.sin(circle), 1000 * radius * np.cos(circle), color=GREY, lw=1.0)
-    drawn = 1000 * (radius + exaggeration * deviation[near])
-    axes.plot(drawn * np.sin(clock[near]), drawn * np.cos(clock[near]), ".", ms=2, color=INK)
+
+    def draw(at: Array, departure: Array | float, *style: str, **look: Any) -> None:
+        r = 1000 * (radius + exaggeration * departure)
+        axes.plot(r * np.sin(at), r * np.cos(at), *style, **look)
+
+    draw(circle, 0.0, color=GREY, lw=1.0)
     if np.isfinite(deformation.depth) and np.isfinite(deformation.clock):
-        oval = radius + exaggeration * deformation.depth * np.cos(2 * (circle - deformation.clock))
-        axes.plot(1000 * oval * np.sin(circle), 1000 * oval * np.cos(circle), color=BLUE, lw=1.0)
+        oval = deformation.depth * np.cos(2 * (circle - deformation.clock))
+        draw(circle, oval, color=BLUE, lw=1.0)
+    draw(angle, mean, ".", ms=3, color=INK)
     axes.set_aspect("equal")
     axes.margins(0.12)
     axes.set(
         xlabel="mm",
-        title=f"section at {deformation.chainage:.2f} m, 12:00 up, deviations × {exaggeration}",
+        title=f"section, 12:00 up, deviations × {exaggeration}",
     )
+
+
+def _means_around(clock: Array, deviation: Array) -> tuple[Array, Array]:
+    """Clock and mean deviation of the points in each cell around the pipe that has some."""
+    cell = np.floor(clock / (2 * np.pi) * SECTION_CELLS).astype(np.intp) % SECTION_CELLS
+    count = np.bincount(cell, minlength=SECTION_CELLS)
+    total = np.bincount(cell, weights=deviation, minlength=SECTION_CELLS)
+    seen = count > 0
+    middle = (np.arange(SECTION_CELLS) + 0.5) * 2 * np.pi / SECTION_CELLS
+    return middle[seen], total[seen] / count[seen]
 
 
 def _draw_centres(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:

@@ -32,9 +32,9 @@ def format_measure(value: float, sd: float = math.nan, unit: str = "", *, decima
 
 def _decimals_of(sd: float) -> int:
     mantissa, exponent = f"{sd:.1e}".split("e")
-    # 0.095 is 9.5e-02, which one digit would round to 0.1: it then starts with a 1.
-    starts_with_one = float(mantissa) < 1.95 or float(mantissa) >= 9.5
-    decimals = -int(exponent) + (1 if starts_with_one else 0)
+    decimals = -int(exponent)
+    if float(mantissa) < 1.95:
+        decimals += 1
     return min(max(decimals, 0), 6)
 
 

@@ -22,7 +22,7 @@ from pipecore.report.format import (
 from pipecore.report.summary import VERDICT_ORDER, by_verdict, summarise
 from pipecore.report.world import FileCoordinates
 from pipecore.resources import resource
-from pipecore.rules import Rule, dent_limit, load_rule, outside_diameter
+from pipecore.rules import Rule, dent_limit, load_rule, outside_diameter, ovality_sd
 from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipecore.types import (
     Deformation,
@@ -142,9 +142,9 @@ def _depth_pct_od(d: Deformation, element: Element) -> str:
 
 
 def _ovality(d: Deformation) -> str:
-    if d.kind is DeformationKind.OVALITY and not np.isfinite(d.ovality):
-        return NOT_MEASURABLE
-    return _number_or_blank(100 * d.ovality)
+    if d.kind is not DeformationKind.OVALITY:
+        return _number_or_blank(100 * d.ovality)
+    return format_measure(100 * d.ovality, 100 * ovality_sd(d))
 
 
 def _number_or_blank(value: float) -> str:
@@ -162,13 +162,12 @@ def _element_table(result: Result) -> dict[str, Any]:
         Column("Verdict", numeric=False),
         Column("Nominal size", numeric=False),
         Column("Radius (mm)"),
-        Column("Bend radius (mm), angle (°)"),
+        Column("Bend (mm, °)"),
         Column("Length (m)"),
         Column("Arc seen (°)"),
         Column("Residual (mm)"),
         Column("Ovality (%)"),
         Column("Straightness (mm)"),
-        Column("Deformations"),
     ]
     worst = {
         e.element_id: min(
@@ -183,7 +182,6 @@ def _element_table(result: Result) -> dict[str, Any]:
         radius = format_measure(1000 * e.radius, 1000 * e.radius_sd)
         if e.kind is ElementKind.CONE:
             radius += f" → {format_measure(1000 * e.radius_end)}"
-        n_deformations = len(result.deformations_of(e.element_id))
         rows.append(
             [
                 e.label,
@@ -197,7 +195,6 @@ def _element_table(result: Result) -> dict[str, Any]:
                 format_measure(1000 * e.rms),
                 format_measure(100 * e.ovality, 100 * e.ovality_sd),
                 _number_or_blank(1000 * e.straightness),
-                str(n_deformations or ""),
             ]
         )
     return {"columns": columns, "rows": rows}

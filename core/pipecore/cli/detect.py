@@ -1,0 +1,76 @@
+"""``pipecore detect``."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from pipecore import io, parallel
+from pipecore.cli.console import Console
+from pipecore.cli.parser import given_settings
+from pipecore.errors import WriteError
+from pipecore.pipeline import detect
+from pipecore.report import by_verdict, summarise, write_report
+from pipecore.report.format import format_clock, format_measure
+from pipecore.rules import load_rule, outside_diameter
+from pipecore.settings import Settings
+from pipecore.types import Result
+
+
+def run(args: argparse.Namespace, console: Console) -> None:
+    """Read, detect, write the report, and say what was found."""
+    settings = Settings.from_toml(args.settings) if args.settings else Settings()
+    settings = settings.replace(given_settings(args))
+    # What would fail at the end fails now.
+    load_rule(settings.deformation.rule)
+    _check_output(args.output, args.overwrite)
+    if args.threads:
+        parallel.set_threads(args.threads)
+
+    cloud = io.read(args.inputs, length_unit=settings.input.length_unit, progress=console)
+    result = detect(cloud, settings, console)
+    write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
+
+    console.say(f"{summarise(result)}.")
+    for line in deformation_lines(result):
+        console.say(line)
+    console.say(f"Report: {args.output / 'report.html'}")
+
+
+def _check_output(directory: Path, overwrite: bool) -> None:
+    if directory.exists() and not directory.is_dir():
+        raise WriteError(f"“{directory}” is a file; give a folder.")
+    if not directory.absolute().parent.is_dir():
+        raise WriteError(f"“{directory}” cannot be made: there is no folder “{directory.parent}”.")
+    if not overwrite and directory.is_dir() and any(directory.iterdir()):
+        raise WriteError(f"The folder “{directory}” is not empty; give another or use --overwrite.")
+
+
+def deformation_lines(result: Result) -> list[str]:
+    """Return the deformations as an aligned table, the worst first; [] if there are none."""
+    rows = [("#", "kind", "element", "chainage", "clock", "depth (mm)", "% OD", "verdict")]
+    for d in by_verdict(result):
+        element = result.element(d.element_id)
+        rows.append(
+            (
+                str(d.deformation_id),
+                d.kind,
+                element.label,
+                f"{d.chainage:.2f} m",
+                format_clock(d.clock),
+                format_measure(1000 * d.depth, 1000 * d.depth_sd),
+                f"{100 * d.depth / outside_diameter(element):.1f}" if np.isfinite(d.depth) else "",
+                d.verdict,
+            )
+        )
+    if len(rows) == 1:
+        return []
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    to_the_right = {0, 3, 4, 5, 6}
+    return [
+        "  ".join(
+            text.rjust(width) if i in to_the_right else text.ljust(width)
+            for i, (text, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in rows
+    ]

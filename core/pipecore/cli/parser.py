@@ -1,0 +1,162 @@
+"""The arguments; those of the settings are made from the settings themselves."""
+
+import argparse
+import dataclasses
+import inspect
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import pipecore
+from pipecore.settings import FieldSpec, Settings, iterate_fields
+
+SETTING = "setting:"
+"""Prefix of the names under which the parser keeps settings, before their dotted keys."""
+
+DETECT_EPILOG = """\
+examples:
+  pipecore detect scan.laz -o report
+  pipecore detect east.e57 west.e57 -o report --stacks-width-mm 15
+  pipecore detect scan.laz -o report --settings report-before/settings.toml
+
+A value that begins with a minus sign takes “=”: --stacks-directions=-1,0,0
+Exit code 0: done; 1: input or settings wrong; 2: usage; 130: cancelled."""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of the whole command line."""
+    parser = argparse.ArgumentParser(
+        prog="pipecore",
+        description="Find pipes in laser scans, measure them, and find where they are deformed.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"pipecore {pipecore.__version__}")
+    parser.set_defaults(shows_stages=True)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_detect(commands)
+    _add_simulate(commands)
+    _add_info(commands)
+    return parser
+
+
+def given_settings(args: argparse.Namespace) -> dict[str, str]:
+    """Return the settings that were given as flags: text by dotted key."""
+    values: Mapping[str, Any] = vars(args)
+    return {
+        name.removeprefix(SETTING): value
+        for name, value in values.items()
+        if name.startswith(SETTING) and value is not None
+    }
+
+
+def _add_detect(commands: Any) -> None:
+    parser = commands.add_parser(
+        "detect",
+        usage="pipecore detect INPUT... -o DIR [options] [--SETTING VALUE ...]",
+        help="find and measure the pipes in scans and write a report",
+        description="Find and measure the pipes in scans and write a report.",
+        epilog=DETECT_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        type=Path,
+        metavar="INPUT",
+        help="scan (LAS, LAZ, E57, PLY, PCD, PTS, XYZ, CSV); several are taken as one cloud",
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the report"
+    )
+    parser.add_argument(
+        "--settings", type=Path, metavar="FILE.toml", help="settings; flags win over them"
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace a report that is already in DIR"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    parser.add_argument(
+        "--threads", type=_count, metavar="N", help="processor threads to use (default: all)"
+    )
+    _add_settings(parser)
+
+
+def _add_simulate(commands: Any) -> None:
+    parser = commands.add_parser(
+        "simulate",
+        help="simulate a scan of a described scene",
+        description="Simulate a scan of a scene; what is true of it is written beside it.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "scene",
+        metavar="SCENE",
+        help="a scene file (.toml) or the name of a scene that comes along",
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="FILE.laz", help="the scan"
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="seed of the scan's random errors")
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+
+
+def _add_info(commands: Any) -> None:
+    parser = commands.add_parser(
+        "info",
+        help="say what is in a scan file",
+        description="Say what is in a scan file: points, extent, spacing, fields, CRS.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.set_defaults(quiet=False, shows_stages=False)
+
+
+def _add_settings(parser: argparse.ArgumentParser) -> None:
+    groups: dict[str, Any] = {}
+    kinds = get_type_hints(Settings)
+    for field in dataclasses.fields(Settings):
+        title = (inspect.getdoc(kinds[field.name]) or field.name).splitlines()[0].rstrip(".")
+        groups[field.name] = parser.add_argument_group(f"settings: {title[0].lower()}{title[1:]}")
+    for key, spec in iterate_fields():
+        groups[spec.group].add_argument(
+            f"--{spec.group}-{spec.name}".replace("_", "-"),
+            dest=SETTING + key,
+            metavar=_metavar(spec),
+            help=_help(spec),
+        )
+
+
+def _metavar(spec: FieldSpec) -> str:
+    if spec.unit:
+        return {"°": "DEG", "%": "PCT"}.get(spec.unit, spec.unit.upper())
+    return "NUMBER" if spec.kind is float else "VALUE"
+
+
+def _help(spec: FieldSpec) -> str:
+    unit = f" {spec.unit}" if spec.unit else ""
+    notes = []
+    if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
+        notes.append("one of " + ", ".join(spec.kind))
+    if spec.minimum is not None and spec.maximum is not None:
+        notes.append(f"{spec.minimum:g} to {spec.maximum:g}{unit}")
+    elif spec.minimum is not None:
+        notes.append(f"at least {spec.minimum:g}{unit}")
+    elif spec.maximum is not None:
+        notes.append(f"at most {spec.maximum:g}{unit}")
+    if spec.zero_means:
+        notes.append(f"0: {spec.zero_means}")
+    if isinstance(spec.default, float):
+        notes.append(f"default {round(spec.default, 3):g}")
+    elif spec.default:
+        notes.append(f"default {spec.default}")
+    text = f"{spec.help} ({'; '.join(notes)})" if notes else spec.help
+    return text.replace("%", "%%")
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("must be at least 1")
+    return number
