@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pipecore.report.summary import by_verdict
 from pipecore.settings import DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result
 from pipegui import selecting
@@ -170,7 +171,7 @@ def step_deformation(document: Document, by: int) -> Document:
     """Select the next (+1) or previous (-1) deformation, in order of urgency."""
     if document.result is None or not document.result.deformations:
         return document
-    ids = [d.deformation_id for d in sorted(document.result.deformations, key=selecting.urgency)]
+    ids = [d.deformation_id for d in by_verdict(document.result)]
     current = document.selection.deformation_id
     place = (ids.index(current) + by) % len(ids) if current in ids else 0
     return select_deformation(document, ids[place])

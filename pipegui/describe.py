@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.geometry import ArcAxis
+from pipecore.geometry import ArcAxis, Array
 from pipecore.report.format import (
     NOT_MEASURABLE,
     cell,
@@ -15,6 +15,8 @@ from pipecore.report.format import (
     format_count,
     format_measure,
 )
+from pipecore.report.summary import summarise
+from pipecore.rules import outside_diameter
 from pipecore.types import (
     NO_ID,
     Deformation,
@@ -23,7 +25,6 @@ from pipecore.types import (
     PointCloud,
     Profiles,
     Result,
-    Verdict,
 )
 from pipegui.document import Scan, Selection
 from pipegui.view_state import PropertiesState, stack_name
@@ -62,22 +63,6 @@ def _measure(
     return Property(label, text, cell(scale * value_m, 4), hint)
 
 
-def summary(result: Result) -> str:
-    """One line on a result: "23 pipes in 7 runs, 5 deformations, 2 to reject"."""
-    n_runs = len({e.run_id for e in result.elements})
-    n_pipes = sum(e.kind is ElementKind.CYLINDER for e in result.elements)
-    n_others = len(result.elements) - n_pipes
-    if not result.elements:
-        return "No pipes found. Try a smaller smallest radius, or check the length unit."
-    found = format_count(n_pipes, "pipe")
-    if n_others:
-        found += " and " + format_count(n_others, "other element")
-    n_rejected = sum(d.verdict is Verdict.REJECT for d in result.deformations)
-    deformations = format_count(len(result.deformations), "deformation")
-    rejected = f", {n_rejected} to reject" if n_rejected else ""
-    return f"{found} in {format_count(n_runs, 'run')}, {deformations}{rejected}"
-
-
 def point_count(n_points: int) -> str:
     """A rounded count of points: "4.3 M points"."""
     if n_points >= 999_950:
@@ -114,11 +99,6 @@ def hover_text(scan: Scan, point_index: int) -> str:
 def radius_text(element: Element) -> str:
     """Radius with its uncertainty."""
     return format_measure(1000 * element.radius, 1000 * element.radius_sd, "mm")
-
-
-def outside_diameter(element: Element) -> float:
-    """The nominal outside diameter where known, else the measured one, metres."""
-    return element.nominal.outside_diameter if element.nominal else 2 * element.radius
 
 
 def title(result: Result | None, selection: Selection) -> str:
@@ -174,7 +154,7 @@ def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
         yield Property("File", cloud.source.name, str(cloud.source), hint=str(cloud.source))
     if scan.result is not None:
         seconds = sum(scan.result.seconds.values())
-        yield Property("Found", summary(scan.result), hint=f"Detected in {seconds:.1f} s.")
+        yield Property("Found", summarise(scan.result), hint=f"Detected in {seconds:.1f} s.")
 
 
 def _of_run(result: Result, run_id: int) -> Iterator[Property | Heading]:
@@ -258,6 +238,6 @@ def _of_profile(profile: Profiles, result: Result) -> Iterator[Property]:
     yield Property("Points", f"{int(row['n_points']):,}", str(int(row["n_points"])))
 
 
-def _position(label: str, world: np.ndarray) -> Property:
+def _position(label: str, world: Array) -> Property:
     text = "  ".join(format_coordinate(float(v)) for v in world)
     return Property(label, text, " ".join(f"{v:.4f}" for v in world), hint="X, Y, Z in metres")

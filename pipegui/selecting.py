@@ -5,11 +5,10 @@ Qt-free. A selection always carries what contains it, so nobody has to look it u
 
 import numpy as np
 
-from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, Result, Verdict
+from pipecore.geometry import Array
+from pipecore.report.summary import by_verdict
+from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, Result
 from pipegui.document import ProfileKey, Selection
-
-VERDICT_ORDER = (Verdict.REJECT, Verdict.REVIEW, Verdict.NOT_MEASURABLE, Verdict.ACCEPT)
-"""The order in which a surveyor wants to see deformations."""
 
 
 def of_element(result: Result, element_id: int) -> Selection:
@@ -64,14 +63,7 @@ def shown_profile(result: Result, selection: Selection) -> ProfileKey | None:
 
 def worst_deformation(result: Result) -> int:
     """Id of the deformation to look at first, `NO_ID` if there are none."""
-    if not result.deformations:
-        return NO_ID
-    return sorted(result.deformations, key=urgency)[0].deformation_id
-
-
-def urgency(deformation: Deformation) -> tuple[int, float]:
-    """Sort key: by verdict, then the deepest first."""
-    return VERDICT_ORDER.index(deformation.verdict), -deformation.depth
+    return by_verdict(result)[0].deformation_id if result.deformations else NO_ID
 
 
 def carried_over(selection: Selection, old: Result | None, new: Result | None) -> Selection:
@@ -99,7 +91,7 @@ def carried_over(selection: Selection, old: Result | None, new: Result | None) -
     return kept
 
 
-def _middle(element: Element) -> np.ndarray:
+def _middle(element: Element) -> Array:
     if element.kind is ElementKind.SPHERE:
         return element.centre
     return element.axis.at(element.axis.length / 2)
@@ -121,7 +113,9 @@ def _same_element(element: Element, result: Result) -> Element | None:
     return best
 
 
-def _same_deformation(deformation: Deformation, element: Element, result: Result):
+def _same_deformation(
+    deformation: Deformation, element: Element, result: Result
+) -> Deformation | None:
     """The deformation of the same kind on `element` whose peak is nearest, within a radius."""
     candidates = [
         (float(np.linalg.norm(d.peak - deformation.peak)), d.deformation_id, d)

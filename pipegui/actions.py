@@ -1,0 +1,197 @@
+"""All actions of the window in one table, and the menus made from it.
+
+An action is a name, what people read, and what has to be there for it to make sense.
+What it does is given by name to `Actions`, so that the table stays a table.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMainWindow, QMenu
+
+from pipegui import theme
+
+
+@dataclass(frozen=True)
+class ActionSpec:
+    """One action; `needs` are conditions that must hold, by the names of `Actions.update`."""
+
+    name: str
+    text: str
+    tip: str
+    icon: str = ""
+    shortcut: str = ""
+    needs: str = ""
+    is_checkable: bool = False
+
+
+_A = ActionSpec
+_SEPARATOR = None
+
+
+def _option(name: str, text: str, tip: str, shortcut: str = "") -> ActionSpec:
+    return ActionSpec(name, text, tip, "", shortcut, "scan", is_checkable=True)
+
+
+MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
+    "File": (
+        _A("open", "Open…", "Open laser scans", "folder-open-outline", "Ctrl+O"),
+        _A("close_scan", "Close scan", "Close the active scan", "close", "Ctrl+W", "scan"),
+        _SEPARATOR,
+        _A("load_settings", "Load settings…", "Take the settings of a TOML file", "tune-variant"),
+        _A("save_settings", "Save settings…", "Keep the settings as a TOML file"),
+        _SEPARATOR,
+        _A("quit", "Quit", "Close the window", "", "Ctrl+Q"),
+    ),
+    "Edit": (
+        _A("undo", "Undo", "Take the last step back", "undo", "Ctrl+Z", "undo"),
+        _A("redo", "Redo", "Do it again", "redo", "Ctrl+Shift+Z", "redo"),
+        _SEPARATOR,
+        _A("go_up", "Go up", "Select what contains it", "arrow-up", "Esc", "selection"),
+    ),
+    "View": (
+        _A("fit", "Fit to view", "Show the whole scan", "fit-to-screen-outline", "F", "scan"),
+        _SEPARATOR,
+        _A("view_top", "From above", "Look down", "axis-z-arrow", "7", "scan"),
+        _A("view_front", "From the south", "Look along +Y", "axis-y-arrow", "1", "scan"),
+        _A("view_right", "From the east", "Look along −X", "axis-x-arrow", "3", "scan"),
+        _A("view_iso", "From a corner", "Look from a corner", "axis-arrow", "0", "scan"),
+        _SEPARATOR,
+        _option("show_points", "Points", "Show the points", "P"),
+        _option("show_axes", "Axes", "Show the axes of the elements", "A"),
+        _option("show_ellipses", "Ellipses", "Show the ellipses of the profiles", "E"),
+        _option("show_surfaces", "Fitted surfaces", "Show the fitted shapes, translucent", "S"),
+        _option("show_labels", "Labels", "Name the deformations in the 3D view", "L"),
+        _option("fly", "Fly to the selection", "Move the camera to what is selected"),
+        _SEPARATOR,
+    ),
+    "Cloud": (
+        _A("next_scan", "Next scan", "Look at the next open scan", "", "Ctrl+Tab", "scans"),
+        _SEPARATOR,
+    ),
+    "Detect": (
+        _A(
+            "detect",
+            "Detect",
+            "Find pipes and their deformations",
+            "magnify-scan",
+            "Ctrl+D",
+            "scan idle",
+        ),
+        _A("cancel", "Cancel", "Stop what is running", "stop-circle-outline", "Ctrl+.", "busy"),
+        _SEPARATOR,
+        _A("add_stack", "Add stack…", "Cut along one more direction", "layers-plus"),
+        _A("reset_settings", "Reset settings", "Back to the defaults", "restore"),
+    ),
+    "Review": (
+        _A(
+            "next_deformation",
+            "Next deformation",
+            "The next one, the worst first",
+            "chevron-right",
+            "N",
+            "deformations",
+        ),
+        _A(
+            "previous_deformation",
+            "Previous deformation",
+            "The one before",
+            "chevron-left",
+            "Shift+N",
+            "deformations",
+        ),
+        _SEPARATOR,
+        _A("isolate", "Isolate", "Hide all but the selection", "eye-outline", "I", "selection"),
+        _A("show_all", "Show all", "Show what is hidden", "eye-check-outline", "Shift+I", "hidden"),
+    ),
+    "Export": (
+        _A(
+            "export_report",
+            "Report folder…",
+            "All tables, the classified cloud and a report to print",
+            "file-chart-outline",
+            "Ctrl+E",
+            "result idle",
+        ),
+        _SEPARATOR,
+        _A(
+            "export_deformations",
+            "Deformations as CSV…",
+            "The table of deformations",
+            "file-delimited-outline",
+            needs="result",
+        ),
+        _A("export_elements", "Elements as CSV…", "The table of elements", needs="result"),
+        _A("export_profiles", "Profiles as CSV…", "The table of profiles", needs="result"),
+        _SEPARATOR,
+        _A(
+            "export_picture", "Picture…", "Save what the 3D view shows", "image-outline", "", "scan"
+        ),
+    ),
+    "Help": (
+        _A("demo", "Try the demo", "Open the demo scan", "play-circle-outline"),
+        _A("shortcuts", "Keyboard shortcuts", "List all keys", "keyboard-outline", "F1"),
+        _SEPARATOR,
+        _A("about", "About PipeGUI", "Version and licences", "information-outline"),
+    ),
+}
+
+SPECS = tuple(spec for menu in MENUS.values() for spec in menu if spec is not None)
+
+
+class Actions:
+    """The window's `QAction`s by name, in its menus."""
+
+    def __init__(self, window: QMainWindow, handlers: Mapping[str, Callable[..., None]]) -> None:
+        self.menus: dict[str, QMenu] = {}
+        self._actions: dict[str, QAction] = {}
+        for name, specs in MENUS.items():
+            menu = self.menus[name] = window.menuBar().addMenu(f"&{name}")
+            for spec in specs:
+                if spec is None:
+                    menu.addSeparator()
+                    continue
+                self._actions[spec.name] = action = _make(spec, window)
+                # `triggered` hands over a check mark, which only check boxes care for.
+                handler = handlers[spec.name]
+                if spec.is_checkable:
+                    action.toggled.connect(handler)
+                else:
+                    action.triggered.connect(lambda _=False, handler=handler: handler())
+                menu.addAction(action)
+        self.refresh_icons()
+
+    def __getitem__(self, name: str) -> QAction:
+        return self._actions[name]
+
+    def refresh_icons(self) -> None:
+        """Draw the icons in the colours of the current scheme."""
+        for spec in SPECS:
+            if spec.icon:
+                self._actions[spec.name].setIcon(theme.icon(spec.icon))
+
+    def update(self, conditions: Mapping[str, bool]) -> None:
+        """Enable what makes sense now."""
+        for spec in SPECS:
+            self._actions[spec.name].setEnabled(
+                all(conditions[need] for need in spec.needs.split())
+            )
+
+    def set_checked(self, name: str, checked: bool) -> None:
+        """Show a check mark without acting on it."""
+        action = self._actions[name]
+        action.blockSignals(True)
+        action.setChecked(checked)
+        action.blockSignals(False)
+
+
+def _make(spec: ActionSpec, window: QMainWindow) -> QAction:
+    action = QAction(spec.text, window)
+    action.setObjectName(spec.name)
+    action.setCheckable(spec.is_checkable)
+    action.setShortcut(QKeySequence(spec.shortcut))
+    shortcut = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
+    action.setToolTip(f"{spec.tip} ({shortcut})" if shortcut else spec.tip)
+    action.setStatusTip(spec.tip)
+    return action

@@ -1,0 +1,272 @@
+"""The project as a tree model: scans, their runs and elements, and their deformations."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+from PySide6.QtCore import (
+    QAbstractItemModel,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QFont, QIcon
+
+from pipecore.report.format import format_count, format_measure
+from pipecore.report.summary import by_verdict
+from pipecore.types import NO_ID, Deformation, Element, Result
+from pipegui import describe, theme
+from pipegui.document import Scan, Selection
+from pipegui.view_state import TreeState
+
+Index = QModelIndex | QPersistentModelIndex
+Role = Qt.ItemDataRole
+NAME, RADIUS, BADGE = range(3)
+HEADERS = ("Name", "r, mm", "")
+
+
+class NodeKind(Enum):
+    """What a node of the tree stands for."""
+
+    ROOT = "root"
+    SCAN = "scan"
+    RUN = "run"
+    ELEMENT = "element"
+    DEFORMATIONS = "deformations"
+    DEFORMATION = "deformation"
+
+
+@dataclass(eq=False)
+class _Node:
+    kind: NodeKind
+    parent: "_Node | None"
+    scan_index: int = 0
+    item_id: int = NO_ID
+    text: str = ""
+    icon: str = ""
+    tint: str = ""
+    radius: str = ""
+    hint: str = ""
+    badge: tuple[Deformation, ...] = ()
+    """Its deformations, the worst first."""
+    elements: tuple[int, ...] = ()
+    """Ids of the elements whose visibility the check box of this node sets."""
+    number: int = 0
+    row: int = 0
+    children: "list[_Node]" = field(default_factory=list)
+
+
+class ProjectModel(QAbstractItemModel):
+    """The nodes are made anew when a scan or result comes or goes, and numbered for Qt."""
+
+    visibility_changed = Signal(object, bool)
+    """Ids of elements, and whether they are to be hidden."""
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._state = TreeState()
+        self._nodes: list[_Node] = []
+        self._root = self._add(_Node(NodeKind.ROOT, None))
+
+    def apply(self, state: TreeState) -> bool:
+        """Show a state; returns whether the nodes were made anew."""
+        before, self._state = self._state, state
+        if state.scans != before.scans:
+            self.beginResetModel()
+            self._nodes = []
+            self._root = self._add(_Node(NodeKind.ROOT, None))
+            for index, scan in enumerate(state.scans):
+                self._add_scan(index, scan)
+            self.endResetModel()
+            return True
+        if (state.hidden_elements, state.active) != (before.hidden_elements, before.active):
+            self._tell_checks(QModelIndex())
+        return False
+
+    def _tell_checks(self, parent: QModelIndex) -> None:
+        if n_rows := self.rowCount(parent):
+            first, last = self.index(0, NAME, parent), self.index(n_rows - 1, BADGE, parent)
+            self.dataChanged.emit(first, last)
+            for row in range(n_rows):
+                self._tell_checks(self.index(row, NAME, parent))
+
+    # Making the nodes
+
+    def _add(self, node: _Node) -> _Node:
+        node.number = len(self._nodes)
+        self._nodes.append(node)
+        if node.parent is not None:
+            node.row = len(node.parent.children)
+            node.parent.children.append(node)
+        return node
+
+    def _add_scan(self, index: int, scan: Scan) -> None:
+        result = scan.result
+        hint = str(scan.cloud.source or scan.name)
+        node = _Node(NodeKind.SCAN, self._root, index, NO_ID, scan.name, "scatter-plot-outline")
+        node.hint = f"{hint}\n{describe.point_count(len(scan.cloud))}"
+        self._add(node)
+        if result is None:
+            return
+        node.elements = tuple(e.element_id for e in result.elements)
+        for run_id in sorted({e.run_id for e in result.elements}):
+            self._add_run(node, run_id, result)
+        if result.deformations:
+            text = f"Deformations ({len(result.deformations)})"
+            branch = _Node(NodeKind.DEFORMATIONS, node, index, NO_ID, text, "target")
+            self._add(branch)
+            for deformation in by_verdict(result):
+                self._add_deformation(branch, deformation, result)
+
+    def _add_run(self, parent: _Node, run_id: int, result: Result) -> None:
+        elements = [e for e in result.elements if e.run_id == run_id]
+        ids = tuple(e.element_id for e in elements)
+        run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, f"Run {run_id}")
+        run.icon, run.elements = "pipe-disconnected", ids
+        run.hint = format_count(len(elements), "element")
+        self._add(run)
+        for element in elements:
+            worst_first = [d for d in by_verdict(result) if d.element_id == element.element_id]
+            self._add_element(run, element, tuple(worst_first))
+
+    def _add_element(
+        self, parent: _Node, element: Element, deformations: tuple[Deformation, ...]
+    ) -> None:
+        node = _Node(NodeKind.ELEMENT, parent, parent.scan_index, element.element_id)
+        node.text, node.icon = element.label, theme.ELEMENT_ICON[element.kind]
+        radius_mm, sd_mm = 1000 * element.radius, 1000 * element.radius_sd
+        node.radius = format_measure(radius_mm, decimals=1)
+        size = element.nominal.name if element.nominal else "no nominal size within tolerance"
+        node.hint = f"{element.label}: r {format_measure(radius_mm, sd_mm, 'mm')}, {size}"
+        node.badge, node.elements = deformations, (element.element_id,)
+        self._add(node)
+
+    def _add_deformation(self, parent: _Node, deformation: Deformation, result: Result) -> None:
+        element = result.element(deformation.element_id)
+        node = _Node(NodeKind.DEFORMATION, parent, parent.scan_index, deformation.deformation_id)
+        name = f"{str(deformation.kind).capitalize()} {deformation.deformation_id}"
+        node.text = f"{name} · {element.label}"
+        node.badge = (deformation,)
+        self._add(node)
+
+    # What Qt asks
+
+    def _node(self, index: Index) -> _Node:
+        return self._nodes[index.internalId()] if index.isValid() else self._root
+
+    def index(self, row: int, column: int, parent: Index = QModelIndex()) -> QModelIndex:  # noqa: B008
+        """Return the index of a child."""
+        if not self.hasIndex(row, column, parent):
+            return QModelIndex()
+        return self.createIndex(row, column, self._node(parent).children[row].number)
+
+    def parent(self, index: Index) -> QModelIndex:  # type: ignore[override]
+        """Return the index of what contains a node."""
+        parent = self._node(index).parent
+        if parent is None or parent is self._root:
+            return QModelIndex()
+        return self.createIndex(parent.row, NAME, parent.number)
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
+        """Return the number of children."""
+        return 0 if parent.column() > 0 else len(self._node(parent).children)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
+        """Return the number of columns."""
+        return len(HEADERS)
+
+    def headerData(  # noqa: N802
+        self, section: int, orientation: Qt.Orientation, role: int = Role.DisplayRole
+    ) -> Any:
+        """Return a column's title."""
+        if orientation is Qt.Orientation.Horizontal and role == Role.DisplayRole:
+            return HEADERS[section]
+        return None
+
+    def flags(self, index: Index) -> Qt.ItemFlag:
+        """Say what can be done with a node."""
+        if not index.isValid():
+            return Qt.ItemFlag.NoItemFlags
+        flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
+        node = self._node(index)
+        if index.column() == NAME and node.elements and node.scan_index == self._state.active:
+            flags |= Qt.ItemFlag.ItemIsUserCheckable
+        return flags
+
+    def data(self, index: Index, role: int = Role.DisplayRole) -> Any:
+        """Return what is shown of a node."""
+        if not index.isValid():
+            return None
+        node = self._node(index)
+        value: Any = None
+        match role:
+            case Role.DisplayRole:
+                badge = str(len(node.badge)) if node.kind is NodeKind.ELEMENT and node.badge else ""
+                value = (node.text, node.radius, badge)[index.column()]
+            case Role.DecorationRole:
+                value = self._icon(node, index.column())
+            case Role.CheckStateRole if index.column() == NAME:
+                value = self._check_state(node)
+            case Role.TextAlignmentRole if index.column() == RADIUS:
+                value = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case Role.ToolTipRole:
+                value = self._hint(node, index.column())
+            case Role.FontRole if node.kind is NodeKind.SCAN:
+                value = QFont()
+                value.setBold(node.scan_index == self._state.active)
+        return value
+
+    def _icon(self, node: _Node, column: int) -> QIcon | None:
+        if column == BADGE and node.kind is NodeKind.ELEMENT and node.badge:
+            return theme.verdict_icon(node.badge[0].verdict)
+        if column != NAME:
+            return None
+        if node.kind is NodeKind.DEFORMATION:
+            return theme.verdict_icon(node.badge[0].verdict)
+        return theme.icon(node.icon, "muted")
+
+    def _hint(self, node: _Node, column: int) -> str:
+        if column == BADGE and node.kind is NodeKind.ELEMENT and node.badge:
+            return "\n".join(f"{str(d.kind).capitalize()}: {d.verdict}" for d in node.badge)
+        return node.hint or node.text
+
+    def _check_state(self, node: _Node) -> Qt.CheckState | None:
+        if not node.elements or node.scan_index != self._state.active:
+            return None
+        n_hidden = len(self._state.hidden_elements.intersection(node.elements))
+        if n_hidden == 0:
+            return Qt.CheckState.Checked
+        all_hidden = n_hidden == len(node.elements)
+        return Qt.CheckState.Unchecked if all_hidden else Qt.CheckState.PartiallyChecked
+
+    def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
+        """Take a click on a check box: it becomes a command, which comes back as a state."""
+        if role != Role.CheckStateRole or not self.flags(index) & Qt.ItemFlag.ItemIsUserCheckable:
+            return False
+        hide = Qt.CheckState(value) == Qt.CheckState.Unchecked
+        self.visibility_changed.emit(self._node(index).elements, hide)
+        return True
+
+    # For the panel
+
+    def what(self, index: Index) -> tuple[int, NodeKind, int]:
+        """Return scan, kind and id of a node."""
+        node = self._node(index)
+        return node.scan_index, node.kind, node.item_id
+
+    def index_of(self, scan_index: int, selection: Selection) -> QModelIndex:
+        """Return the node of a selection, the invalid index for nothing."""
+        if selection.deformation_id:
+            wanted = (NodeKind.DEFORMATION, selection.deformation_id)
+        elif selection.element_id:
+            wanted = (NodeKind.ELEMENT, selection.element_id)
+        elif selection.run_id:
+            wanted = (NodeKind.RUN, selection.run_id)
+        else:
+            return QModelIndex()
+        for node in self._nodes:
+            if (node.scan_index, node.kind, node.item_id) == (scan_index, *wanted):
+                return self.createIndex(node.row, NAME, node.number)
+        return QModelIndex()

@@ -1,0 +1,202 @@
+"""The settings as a form, made from the metadata of `pipecore.settings`."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QFormLayout,
+    QLabel,
+    QLineEdit,
+    QScrollArea,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from pipecore.rules import list_rules
+from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipegui import theme
+from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+
+ELSEWHERE = {"stacks.preset", "stacks.directions"}
+"""Set in the stacks panel."""
+
+GROUP_TITLES = {
+    "input": "File",
+    "thinning": "Thinning",
+    "stacks": "Stacks",
+    "profiles": "Profiles",
+    "ellipses": "Ellipses",
+    "elements": "Elements",
+    "deformation": "Deformations",
+}
+LARGEST = 1e6
+
+
+class SettingsForm(QScrollArea):
+    """One line a setting, in groups; the advanced ones are folded away."""
+
+    changed = Signal(str, object)
+    """Dotted key and new value."""
+    reset_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("Settings")
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._applying = Applying()
+        self._show: dict[str, Callable[[Any], None]] = {}
+        self._labels: dict[str, QLabel] = {}
+        self._specs = {key: spec for key, spec in iterate_fields() if key not in ELSEWHERE}
+        body = QWidget()
+        column = QVBoxLayout(body)
+        column.setContentsMargins(theme.SPACING, theme.SPACING, theme.SPACING, theme.SPACING)
+        column.setSpacing(theme.SPACING)
+        self._add_groups(column, advanced=False)
+        self.advanced = _Fold("Advanced")
+        self._add_groups(self.advanced.content, advanced=True)
+        column.addWidget(self.advanced)
+        self.reset = QToolButton()
+        self.reset.setText("Reset to defaults")
+        self.reset.clicked.connect(self.reset_requested)
+        column.addWidget(self.reset)
+        column.addStretch()
+        self.setWidget(body)
+        self.apply(Settings())
+
+    def _add_groups(self, column: QVBoxLayout, *, advanced: bool) -> None:
+        for group, title in GROUP_TITLES.items():
+            specs = {
+                key: spec
+                for key, spec in self._specs.items()
+                if spec.group == group and spec.advanced == advanced
+            }
+            if not specs:
+                continue
+            heading = QLabel(title)
+            heading.setProperty("heading", True)
+            column.addWidget(heading)
+            form = QFormLayout()
+            form.setContentsMargins(0, 0, 0, theme.SPACING // 2)
+            form.setSpacing(theme.SPACING // 2)
+            form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+            for key, spec in specs.items():
+                label, field = QLabel(spec.label), self._field(key, spec)
+                label.setMinimumWidth(16 * theme.SPACING)
+                field.setMinimumWidth(10 * theme.SPACING)
+                field.setObjectName(key)
+                field.setAccessibleName(spec.label)
+                label.setBuddy(field)
+                for widget in (label, field):
+                    widget.setToolTip(_help(spec))
+                self._labels[key] = label
+                form.addRow(label, field)
+            column.addLayout(form)
+
+    def _field(self, key: str, spec: FieldSpec) -> QWidget:
+        if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
+            return self._choice(key, [(str(value), value) for value in spec.kind])
+        if key == "deformation.rule":
+            return self._choice(key, [(rule.title, rule.name) for rule in list_rules()])
+        if spec.kind is float:
+            return self._number(key, spec)
+        return self._text(key)
+
+    def _choice(self, key: str, choices: list[tuple[str, Any]]) -> QWidget:
+        field = QuietComboBox()
+        for text, value in choices:
+            field.addItem(text, value)
+        # A long title must not widen the panel; the list shows it in full.
+        field.setSizeAdjustPolicy(field.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        field.setMinimumContentsLength(8)
+        values = [value for _, value in choices]
+
+        def show(value: Any) -> None:
+            if value not in values:
+                field.addItem(str(value), value)
+                values.append(value)
+            field.setCurrentIndex(values.index(value))
+
+        self._show[key] = show
+        field.currentIndexChanged.connect(lambda i: self._tell(key, values[i]))
+        return field
+
+    def _number(self, key: str, spec: FieldSpec) -> QWidget:
+        field = QuietSpinBox()
+        field.setDecimals(3 if spec.maximum is not None and spec.maximum <= 1 else 1)
+        lowest = -LARGEST if spec.minimum is None else spec.minimum
+        field.setRange(lowest, LARGEST if spec.maximum is None else spec.maximum)
+        field.setSingleStep(0.01 if field.decimals() == 3 else 1.0)
+        if spec.unit:
+            field.setSuffix(f" {spec.unit}" if spec.unit != "°" else "°")
+        if spec.zero_means:
+            field.setSpecialValueText(spec.zero_means)
+        self._show[key] = field.setValue
+        field.valueChanged.connect(lambda value: self._tell(key, value))
+        return field
+
+    def _text(self, key: str) -> QWidget:
+        field = QLineEdit()
+        self._show[key] = lambda value: field.setText(str(value))
+        field.editingFinished.connect(lambda: self._tell(key, field.text()))
+        return field
+
+    def _tell(self, key: str, value: Any) -> None:
+        if not self._applying:
+            self.changed.emit(key, value)
+
+    def apply(self, settings: Settings) -> None:
+        """Show settings; what differs from the default stands in bold."""
+        with self._applying:
+            for key, spec in self._specs.items():
+                self._show[key](settings.get(key))
+                font = self._labels[key].font()
+                font.setBold(settings.get(key) != spec.default)
+                self._labels[key].setFont(font)
+        changed = any(settings.get(key) != spec.default for key, spec in self._specs.items())
+        self.reset.setEnabled(changed)
+
+
+def _help(spec: FieldSpec) -> str:
+    lines = [spec.help]
+    unit = f" {spec.unit}" if spec.unit else ""
+    if spec.minimum is not None and spec.maximum is not None:
+        lines.append(f"{spec.minimum:g} … {spec.maximum:g}{unit}")
+    elif spec.minimum is not None:
+        lines.append(f"at least {spec.minimum:g}{unit}")
+    default = spec.zero_means if spec.zero_means and spec.default == 0 else None
+    if default is None:
+        default = f"{spec.default:.4g}{unit}" if spec.kind is float else str(spec.default)
+    lines.append(f"Default: {default}")
+    return "\n".join(lines)
+
+
+class _Fold(QWidget):
+    """A heading that folds what is below it away."""
+
+    def __init__(self, title: str) -> None:
+        super().__init__()
+        self.button = QToolButton()
+        self.button.setText(title)
+        self.button.setCheckable(True)
+        self.button.setAutoRaise(True)
+        self.button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        body = QWidget()
+        self.content = QVBoxLayout(body)
+        self.content.setContentsMargins(0, 0, 0, 0)
+        self.content.setSpacing(theme.SPACING)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self.button)
+        column.addWidget(body)
+        self._body = body
+        self.button.toggled.connect(self._fold)
+        self._fold(False)
+
+    def _fold(self, is_open: bool) -> None:
+        self._body.setVisible(is_open)
+        arrow = Qt.ArrowType.DownArrow if is_open else Qt.ArrowType.RightArrow
+        self.button.setArrowType(arrow)
