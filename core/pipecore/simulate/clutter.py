@@ -21,6 +21,7 @@ from pipecore.simulate.scene import (
     Box,
     Clutter,
     Person,
+    Plate,
     Tray,
     TrayStyle,
     Valve,
@@ -48,6 +49,8 @@ def clutter_parts(clutter: tuple[Clutter, ...]) -> list[Part]:
                 raise SceneError(f"{where}: the size is not positive.")
             mesh = block(np.array(thing.centre), np.array(thing.size), yaw_axes(thing.yaw_deg))
             parts.append(Part(mesh, thing.material))
+        elif isinstance(thing, Plate):
+            parts.append(Part(_plate(thing, where), thing.material))
         elif isinstance(thing, Beam):
             parts.append(Part(_beam(thing, where), thing.material))
         elif isinstance(thing, Tray):
@@ -59,6 +62,16 @@ def clutter_parts(clutter: tuple[Clutter, ...]) -> list[Part]:
         else:
             parts += _person(thing)
     return parts
+
+
+def _plate(plate: Plate, where: str) -> Mesh:
+    edges = np.array([plate.along, plate.across])
+    lengths = np.linalg.norm(edges, axis=1)
+    normal = np.cross(edges[0], edges[1])
+    if np.linalg.norm(normal) <= 1e-9 * lengths.prod():
+        raise SceneError(f"{where}: its edges span no area.")
+    axes = np.vstack([edges / lengths[:, None], unit(normal)])
+    return block(np.array(plate.centre), np.array([*lengths, plate.thickness]), axes)
 
 
 def _span(start: Array, end: Array, where: str) -> tuple[Array, float]:

@@ -20,7 +20,6 @@ from pipecore.simulate.truth import Truth
 from pipecore.types import NO_ID, PointCloud
 
 CHUNK = 400_000
-LOWEST_ELEVATION = np.deg2rad(-62.0)
 FULL_INTENSITY = 4095.0
 LAMPS = np.array([[0.35, -0.5, 0.79], [-0.6, 0.45, 0.66]])
 LAMP_POWER = np.array([0.42, 0.22])
@@ -121,11 +120,32 @@ class World:
                 tensor(part.mesh.vertices.astype(np.float32)),
                 tensor(part.mesh.triangles),
             )
+        vertices = np.concatenate([p.mesh.vertices for p in parts])
+        self._middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        self._reach = float(np.linalg.norm(vertices - self._middle, axis=1).max())
         materials = [MATERIALS[p.material] for p in parts]
         self.element_id = np.array([p.element_id for p in parts], dtype=np.int32)
         self.rgb = np.array([m.rgb for m in materials]) / 255.0
         self.reflectance = np.array([m.reflectance for m in materials])
         self.mottle = np.array([m.mottle for m in materials])
+
+    def elevations(self, position: Array) -> tuple[float, float]:
+        """Lowest and highest elevation of the world's bounding sphere from `position`."""
+        to_middle = self._middle - position
+        distance = float(np.linalg.norm(to_middle))
+        if distance <= 1.01 * self._reach:
+            return -np.pi / 2, np.pi / 2
+        middle, half = np.arcsin(to_middle[2] / distance), np.arcsin(1.01 * self._reach / distance)
+        return float(middle - half), float(middle + half)
+
+    def may_hit(self, position: Array, directions: Array) -> NDArray[np.bool_]:
+        """Whether rays from `position` come near the world's bounding sphere."""
+        to_middle = self._middle - position
+        along = directions @ to_middle
+        passes = np.einsum("i,i", to_middle, to_middle) - along**2
+        is_inside = np.linalg.norm(to_middle) < self._reach
+        # Room for the pointing error and the footprint.
+        return np.asarray(is_inside | ((along > 0) & (passes < (1.01 * self._reach) ** 2)))
 
     def cast(self, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int32], Array]:
         """Range (inf for none), part and unit normal of what each ray hits first."""
@@ -161,9 +181,9 @@ def angular_step(placement: Placement, station: Array, spacing: float) -> float:
     return float(spacing / distances[order][middle])
 
 
-def ray_grid(step: float) -> tuple[Array, NDArray[np.int64]]:
+def ray_grid(step: float, lowest: float, highest: float) -> tuple[Array, NDArray[np.int64]]:
     """Rows of rays: their elevations and their numbers, evenly dense over the sphere."""
-    elevations = np.arange(LOWEST_ELEVATION, np.pi / 2, step)
+    elevations = np.arange(lowest, min(highest, np.pi / 2), step)
     return elevations, np.ceil(2 * np.pi * np.cos(elevations) / step).astype(np.int64)
 
 
@@ -182,7 +202,9 @@ class _Station:
 
     def scan(self, step: float, stage: str, progress: Progress) -> _Points:
         """Measure along a whole grid of rays `step` apart, chunk by chunk."""
-        elevations, counts = ray_grid(step)
+        low, high = self.world.elevations(self.position)
+        lowest = max(low, np.deg2rad(self.scanner.lowest_elevation_deg))
+        elevations, counts = ray_grid(step, lowest, high)
         first_azimuth = self.rng.uniform(0.0, 2 * np.pi, len(elevations))
         row_start = np.concatenate([[0], np.cumsum(counts)])
         chunks = []
@@ -190,7 +212,8 @@ class _Station:
             rays = np.arange(start, stop)
             row = np.searchsorted(row_start, rays, side="right") - 1
             azimuth = first_azimuth[row] + 2 * np.pi * (rays - row_start[row]) / counts[row]
-            chunks.append(self.measure(_directions(elevations[row], azimuth)))
+            directions = _directions(elevations[row], azimuth)
+            chunks.append(self.measure(directions[self.world.may_hit(self.position, directions)]))
         return _joined(chunks)
 
     def measure(self, reported: Array) -> _Points:

@@ -177,6 +177,17 @@ class Box:
 
 
 @dataclass(frozen=True)
+class Plate:
+    """A thin sheet in any attitude, its edges given as vectors."""
+
+    centre: Vector
+    along: Vector
+    across: Vector
+    thickness: float = 0.002
+    material: str = "grey"
+
+
+@dataclass(frozen=True)
 class Beam:
     """An I-beam between two points of the middle of its top, with its web upright."""
 
@@ -237,7 +248,7 @@ class Person:
     material: str = "orange"
 
 
-Clutter = Box | Beam | Tray | Wire | Valve | Person
+Clutter = Box | Plate | Beam | Tray | Wire | Valve | Person
 
 
 @dataclass(frozen=True)
@@ -265,6 +276,8 @@ class Scanner:
     dropout : float
         Share of returns lost anywhere; more are lost near grazing incidence and far off.
     max_range : float
+    lowest_elevation_deg : float
+        The tripod hides what is below.
     registration : float
         Standard deviation of each coordinate of a station's position after
         registration, in metres; its attitude errs by as much at 10 m.
@@ -282,6 +295,7 @@ class Scanner:
     pulse_length: float = 0.5
     dropout: float = 0.003
     max_range: float = 60.0
+    lowest_elevation_deg: float = -62.0
     registration: float = 0.0
     ambient_rays: int = 0
 

@@ -34,17 +34,16 @@ def _covered(element: TrueElement, points: Array, spacing: float) -> TrueElement
     length = element.axis.length
     n_steps = max(1, round(length / COVERAGE_STEP))
     chainage, _, clock = element.axis.pipe_coordinates(points)
-    step = np.clip(np.floor(chainage / length * n_steps), 0, n_steps - 1).astype(np.int64)
-    arc = np.array(
-        [
-            _arc(clock[step == i], radius, spacing)
-            for i, radius in enumerate(
-                element.radius_at((np.arange(n_steps) + 0.5) * length / n_steps)
-            )
-        ]
-    )
-    count = np.bincount(step, minlength=n_steps).astype(np.int32)
-    return replace(element, arc_seen=arc, points_seen=count)
+    order = np.argsort(chainage)
+    chainage, clock = chainage[order], clock[order]
+    edges = np.linspace(0.0, length, n_steps + 1)
+    # Two rows of points say little of where an arc ends, so the neighbours help.
+    first = np.searchsorted(chainage, edges[:-1] - COVERAGE_STEP)
+    last = np.searchsorted(chainage, edges[1:] + COVERAGE_STEP)
+    radii = element.radius_at((edges[:-1] + edges[1:]) / 2)
+    arc = [_arc(clock[i:j], r, spacing) for i, j, r in zip(first, last, radii, strict=True)]
+    count = np.diff(np.searchsorted(chainage, edges)).astype(np.int32)
+    return replace(element, arc_seen=np.array(arc), points_seen=count)
 
 
 def _arc(clock: Array, radius: float, spacing: float) -> float:

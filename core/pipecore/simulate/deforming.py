@@ -1,0 +1,60 @@
+"""Random deformations of given runs."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipecore.simulate.scene import (
+    Bow,
+    Bulge,
+    DeformationSpec,
+    Dent,
+    DentShape,
+    Ovality,
+    Run,
+    Straight,
+)
+from pipecore.types import DeformationKind
+
+
+def deform(runs: tuple[Run, ...], is_free: list[bool], rng: np.random.Generator) -> tuple[Run, ...]:
+    """Return the runs, about a third of their straights longer than 0.7 m deformed.
+
+    Only dents are put on runs that something touches: they cannot penetrate it.
+    """
+    result = []
+    for run, free in zip(runs, is_free, strict=True):
+        pieces = tuple(
+            replace(p, deformations=(random_deformation(p.length, run.radius, rng, free=free),))
+            if isinstance(p, Straight) and p.length > 0.7 and rng.uniform() < 0.35
+            else p
+            for p in run.pieces
+        )
+        result.append(replace(run, pieces=pieces))
+    return tuple(result)
+
+
+def random_deformation(
+    length: float, radius: float, rng: np.random.Generator, *, free: bool
+) -> DeformationSpec:
+    """Return a deformation for a straight of `length`; any kind if it stands `free`."""
+    kinds = [DeformationKind.DENT] * 4
+    if free:
+        kinds += [DeformationKind.BULGE, DeformationKind.OVALITY, DeformationKind.BOW]
+    kind = kinds[rng.integers(len(kinds))]
+    clock_deg = float(rng.uniform(0.0, 360.0))
+    if kind is DeformationKind.OVALITY:
+        extent = min(1.0, 0.8 * length)
+        start = float(rng.uniform(0.05 * length, 0.95 * length - extent))
+        return Ovality(float(rng.uniform(0.03, 0.08)), clock_deg, start, start + extent)
+    if kind is DeformationKind.BOW:
+        return Bow(float(rng.uniform(0.004, 0.012)) * length, clock_deg)
+    extents = 2 * radius * rng.uniform(0.5, 1.0, 2)
+    extent = float(np.clip(extents[0], 0.08, 0.4 * length))
+    width = float(np.clip(extents[1], 0.06, 2.5 * radius))
+    chainage = float(rng.uniform(0.1 * length + extent / 2, 0.9 * length - extent / 2))
+    depth = float(np.clip(rng.uniform(0.03, 0.12) * 2 * radius, 0.005, 0.03))
+    if kind is DeformationKind.BULGE:
+        return Bulge(chainage, clock_deg, depth, extent, width)
+    shape = rng.choice([DentShape.SMOOTH, DentShape.SMOOTH, DentShape.FLAT, DentShape.SHARP])
+    return Dent(chainage, clock_deg, depth, extent, width, DentShape(shape))

@@ -1,0 +1,457 @@
+"""Random sections of plants: racks, risers, crossings, vessels, supports, and their dents."""
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pipecore.errors import SceneError
+from pipecore.geometry import Array, unit
+from pipecore.simulate.deforming import deform
+from pipecore.simulate.room import Room
+from pipecore.simulate.scene import (
+    Beam,
+    Box,
+    Branch,
+    Cap,
+    Clutter,
+    Elbow,
+    Flange,
+    Person,
+    Piece,
+    Reducer,
+    Run,
+    Scanner,
+    Scene,
+    Sphere,
+    Straight,
+    Tee,
+    Tray,
+    TrayStyle,
+    Valve,
+    Vector,
+    Wire,
+)
+from pipecore.simulate.sizes import SIZES, PipeSize
+
+RACK_LENGTH = 6.0
+RACK_DEPTH = 3.0
+NEAR = 0.01
+"""Pipes that nearly touch are this far apart, metres."""
+
+PAINTS = ("galvanised", "steel", "stainless", "cladding", "blue", "green", "yellow", "grey")
+ALONG, ACROSS, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def random_scene(
+    seed: int,
+    *,
+    stations: int = 4,
+    deformed: bool = True,
+    clutter: bool = True,
+    spacing: float = 0.01,
+    noise: float = 0.002,
+    scanner: Scanner | None = None,
+) -> Scene:
+    """Return a plausible section of a plant, about 9 × 7 × 4 m, the same for the same seed.
+
+    Pipes touch, nearly touch, lie on beams and posts and cross in contact, but never
+    penetrate each other.
+
+    Parameters
+    ----------
+    seed : int
+    stations : int
+        Number of scanner stations around it, 1 to 6.
+    deformed : bool
+        Whether some pipes have dents, bulges, oval stretches or bows.
+    clutter : bool
+        Whether there are floor, wall, supports, trays, valves and people.
+    spacing, noise : float
+        Point spacing on the pipes and standard deviation of ranges, metres.
+    scanner : Scanner, optional
+        All other properties of the scanner.
+
+    Raises
+    ------
+    SceneError
+        If the number of stations is not within 1 to 6.
+    """
+    if not 1 <= stations <= 6:
+        raise SceneError(f"A random scene has 1 to 6 stations, not {stations}.")
+    planner = _Planner(np.random.default_rng(seed))
+    planner.add_racks()
+    planner.add_vessel()
+    planner.add_risers()
+    planner.add_crossings()
+    planner.add_oblique_pipes()
+    if clutter:
+        planner.add_clutter()
+    positions = planner.find_stations(stations)
+    runs = tuple(planner.room.runs)
+    if deformed:
+        runs = deform(runs, planner.is_free, planner.rng)
+    scene = Scene(
+        runs,
+        positions,
+        tuple(planner.clutter),
+        replace(scanner or Scanner(), spacing=spacing, noise=noise),
+        seed=seed,
+        name=f"random plant {seed}",
+    )
+    # Half of the plants stand askew to the coordinates, as real ones do.
+    yaw_deg = float(planner.rng.uniform(0, 90)) if planner.rng.uniform() < 0.5 else 0.0
+    askew: Scene = turned(scene, yaw_deg)
+    return askew
+
+
+def turned(thing: Any, yaw_deg: float) -> Any:
+    """Return a scene, or anything in it, turned about the vertical through the local zero."""
+    if dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        changes = {
+            f.name: turned(getattr(thing, f.name), yaw_deg)
+            for f in dataclasses.fields(thing)
+            if f.name not in {"size", "origin", "deformations"}
+        }
+        if "yaw_deg" in changes:
+            changes["yaw_deg"] += yaw_deg
+        return replace(thing, **changes)
+    if isinstance(thing, tuple):
+        if len(thing) == 3 and all(isinstance(c, float) for c in thing):
+            c, s = np.cos(np.deg2rad(yaw_deg)), np.sin(np.deg2rad(yaw_deg))
+            return (
+                float(c * thing[0] - s * thing[1]),
+                float(s * thing[0] + c * thing[1]),
+                thing[2],
+            )
+        return tuple(turned(t, yaw_deg) for t in thing)
+    return thing
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(v) for v in values)
+    return x, y, z
+
+
+@dataclass
+class _Planner:
+    """Places things one after the other; what does not fit is tried otherwise or left out."""
+
+    rng: np.random.Generator
+    room: Room = field(default_factory=Room)
+    clutter: list[Clutter] = field(default_factory=list)
+    is_free: list[bool] = field(default_factory=list)
+    """By run: whether nothing supports or nearly touches it."""
+    supports: list[float] = field(default_factory=list)
+    """Heights of the rack's levels."""
+
+    def _size(self, largest_dn: int = 400, smallest_dn: int = 40) -> PipeSize:
+        fitting = [s for s in SIZES if smallest_dn <= s.dn <= largest_dn]
+        return fitting[self.rng.integers(len(fitting))]
+
+    def _paint(self) -> str:
+        return PAINTS[self.rng.integers(len(PAINTS))]
+
+    def _try(
+        self, make: Callable[[], Run], gap: float, *, free: bool, n_tries: int = 8
+    ) -> Run | None:
+        for _ in range(n_tries):
+            run = make()
+            if self.room.add_run(run, gap):
+                self.is_free.append(free)
+                return run
+        return None
+
+    def add_racks(self) -> None:
+        """Parallel pipes on two or three levels, each level lying on the same beams."""
+        levels = [0.0, *np.sort(self.rng.uniform([0.9, 2.0], [1.4, 2.7]))]
+        for i, level in enumerate(levels):
+            largest = 400 if i < 2 else 250
+            # The lowest pipes lie on the floor or just above it.
+            bottom = float(level) if i else float(self.rng.choice([0.0, 0.02, 0.15]))
+            self.supports.append(bottom)
+            y, n_pipes = float(self.rng.uniform(0.0, 0.5)), int(self.rng.integers(3, 6))
+            for _ in range(n_pipes):
+                size = self._size(largest)
+                gap = float(self.rng.choice([0.0, NEAR, 0.03, 0.12, 0.3]))
+                y += gap + size.radius
+                if y + size.radius > RACK_DEPTH:
+                    break
+                start = np.array([self.rng.uniform(0.0, 0.6), y, bottom + size.radius])
+                for attempt in range(6):
+                    pieces = self._rack_pieces(size, plain=attempt == 5)
+                    run = Run(_vector(start), ALONG, size.radius, pieces, "", self._paint())
+                    if self.room.add_run(run, 0.0):
+                        self.is_free.append(False)
+                        break
+                y += size.radius
+
+    def _rack_pieces(self, size: PipeSize, *, plain: bool) -> tuple[Piece, ...]:
+        length = RACK_LENGTH - float(self.rng.uniform(0.0, 1.5))
+        if plain:
+            return (Straight(length),)
+        first = float(self.rng.uniform(0.25, 0.7)) * length
+        rest = length - first
+        makers = (self._interrupted, self._turning_off, self._offset)
+        return makers[self.rng.integers(len(makers))](size, first, rest)
+
+    def _interrupted(self, size: PipeSize, first: float, rest: float) -> tuple[Piece, ...]:
+        """A straight with a flange, a reducer or a tee in it, or nothing."""
+        reducer = Reducer(1.2 * size.outside_diameter, self._smaller(size).radius)
+        fittings: list[Piece | None] = [self._flange(size), reducer, self._tee(size), None]
+        fitting = fittings[self.rng.integers(len(fittings))]
+        if fitting is None:
+            return (Straight(first + rest),)
+        return (Straight(first), fitting, Straight(rest))
+
+    def _turning_off(self, size: PipeSize, first: float, rest: float) -> tuple[Piece, ...]:
+        """A straight that ends in an elbow upwards or aside."""
+        bend = size.bend_radius(float(self.rng.choice([1.5, 1.5, 3.0])))
+        towards = (UP, ACROSS, (0.0, -1.0, 0.0))[self.rng.integers(3)]
+        angle = 90.0
+        if towards != UP:
+            angle = float(self.rng.choice([90.0, 45.0, self.rng.uniform(20, 80)]))
+        after = float(self.rng.uniform(0.4, 1.2))
+        return (Straight(first + 0.3 * rest), Elbow(angle, bend, towards), Straight(after))
+
+    def _offset(self, size: PipeSize, first: float, rest: float) -> tuple[Piece, ...]:
+        """Two elbows that move the run aside."""
+        bend = size.bend_radius(float(self.rng.choice([1.5, 3.0])))
+        angle = float(self.rng.choice([45.0, 30.0, 60.0]))
+        sides = (ACROSS, (0.0, -1.0, 0.0))
+        i = int(self.rng.integers(2))
+        return (
+            Straight(0.6 * first),
+            Elbow(angle, bend, sides[i]),
+            Straight(float(self.rng.uniform(0.2, 0.6))),
+            Elbow(angle, bend, sides[1 - i]),
+            Straight(rest),
+        )
+
+    def _flange(self, size: PipeSize) -> Flange:
+        return Flange(size.flange_diameter / 2, size.flange_thickness, size.n_bolts)
+
+    def _smaller(self, size: PipeSize) -> PipeSize:
+        i = SIZES.index(size)
+        return SIZES[max(0, i - int(self.rng.integers(1, 4)))] if i else SIZES[1]
+
+    def _tee(self, size: PipeSize) -> Tee:
+        small = self._smaller(size) if size is not SIZES[0] else size
+        reach = size.outside_diameter
+        pieces: tuple[Piece, ...] = (Straight(reach + float(self.rng.uniform(0.2, 0.8))),)
+        if self.rng.uniform() < 0.5:
+            pieces += (self._flange(small), Straight(0.2))
+        return Tee(2 * reach, Branch(UP, small.radius, pieces))
+
+    def add_vessel(self) -> None:
+        """A vessel or tank beside the rack, lying or standing, and at times a sphere."""
+        radius = float(self.rng.uniform(0.35, 0.8))
+        length = float(self.rng.uniform(1.2, 2.2))
+        x, y = self.rng.uniform(1.0, 4.5), RACK_DEPTH + radius + self.rng.uniform(0.4, 0.9)
+        pieces = (Cap(), Straight(length), Cap())
+        paint = self._paint()
+        if self.rng.uniform() < 0.5:
+            z = radius + 0.3
+            run = Run((x - length / 2, y, z), ALONG, radius, pieces, "vessel", paint)
+            if self.room.add_run(run, 0.05):
+                self.is_free.append(False)
+                for s in (-0.3, 0.3):
+                    self._saddle(np.array([x + s * length, y, z]), radius)
+        else:
+            z = radius / 2 + 0.1
+            run = Run((x, y, z), UP, radius, pieces, "tank", paint)
+            if self.room.add_run(run, 0.05):
+                self.is_free.append(False)
+        if self.rng.uniform() < 0.5:
+            ball = float(self.rng.uniform(0.15, 0.35))
+            size = self._size(80)
+            x = float(self.rng.uniform(0.5, 5.0))
+            z = float(self.rng.uniform(0.8, 1.6))
+
+            def with_sphere() -> Run:
+                start = (x, RACK_DEPTH + float(self.rng.uniform(0.3, 2.0)), z - 0.5 - ball)
+                pieces = (Straight(0.5), Sphere(ball), Straight(0.5))
+                return Run(start, UP, size.radius, pieces, "sphere", self._paint())
+
+            self._try(with_sphere, 0.05, free=False)
+
+    def _saddle(self, axis_point: Array, radius: float) -> None:
+        """A plinth under a lying vessel, touching it along its middle."""
+        top = axis_point[2] - radius
+        size = np.array([0.12, 1.2 * radius, top])
+        self._add_box(np.array([axis_point[0], axis_point[1], top / 2]), size, "concrete")
+
+    def add_risers(self) -> None:
+        """Verticals from the floor with a flange at the foot, most of them turning off."""
+        for _ in range(int(self.rng.integers(2, 5))):
+            self._try(self._riser, NEAR, free=True)
+
+    def _riser(self) -> Run:
+        size = self._size(300)
+        x, y = self.rng.uniform(-0.5, RACK_LENGTH), self.rng.uniform(-0.8, RACK_DEPTH + 1.0)
+        height = float(self.rng.uniform(1.2, 3.0))
+        pieces: tuple[Piece, ...] = (Straight(0.15), self._flange(size), Straight(height))
+        if self.rng.uniform() < 0.7:
+            bend = size.bend_radius(float(self.rng.choice([1.5, 3.0])))
+            azimuth = self.rng.choice([0, np.pi / 2, np.pi, 3 * np.pi / 2])
+            towards = (float(np.cos(azimuth)), float(np.sin(azimuth)), 0.0)
+            angle = float(self.rng.choice([90.0, 90.0, 60.0]))
+            pieces += (Elbow(angle, bend, towards), Straight(float(self.rng.uniform(0.5, 1.5))))
+        return Run(_vector(np.array([x, y, 0.0])), UP, size.radius, pieces, "riser", self._paint())
+
+    def add_crossings(self) -> None:
+        """Pipes across the rack, lying in contact on its highest pipe."""
+        for bottom in self.supports[1:]:
+            x = float(self.rng.uniform(0.8, RACK_LENGTH - 2.0))
+            size = self._size(150)
+            on_level = [
+                r
+                for r in self.room.runs
+                if r.direction == ALONG and abs(r.start[2] - r.radius - bottom) < 1e-6
+            ]
+            if not on_level:
+                continue
+            z = bottom + max(2 * r.radius for r in on_level) + size.radius
+            start = (x, -0.4, z)
+            run = Run(
+                start, ACROSS, size.radius, (Straight(RACK_DEPTH + 0.6),), "crossing", self._paint()
+            )
+            if self.room.add_run(run, 0.0):
+                self.is_free.append(False)
+
+    def add_oblique_pipes(self) -> None:
+        """Pipes in no main direction, some with an elbow of an odd angle."""
+        for _ in range(int(self.rng.integers(2, 4))):
+            self._try(self._oblique_pipe, 0.03, free=True, n_tries=25)
+
+    def _oblique_pipe(self) -> Run:
+        size = self._size(200)
+        direction = unit(self.rng.standard_normal(3) * [1.0, 1.0, 0.7])
+        start = self.rng.uniform([0.0, -0.8, 0.8], [RACK_LENGTH, RACK_DEPTH + 1.5, 3.2])
+        lengths = self.rng.uniform(0.7, 1.8, 2)
+        if start[2] + min(direction[2], 0.0) * lengths.sum() < 0.3:
+            direction[2] = abs(direction[2])
+        pieces: tuple[Piece, ...] = (Straight(float(lengths[0])),)
+        if self.rng.uniform() < 0.6:
+            towards = _vector(self.rng.standard_normal(3) * [1.0, 1.0, 0.3])
+            angle = float(self.rng.uniform(15, 60))
+            pieces += (
+                Elbow(angle, size.bend_radius(3.0), towards),
+                Straight(float(lengths[1])),
+            )
+        return Run(
+            _vector(start), _vector(direction), size.radius, pieces, "oblique", self._paint()
+        )
+
+    def add_clutter(self) -> None:
+        """Floor, wall, supports under the levels, tray, valves, cabinet, rods and someone."""
+        low_y = min(float((b.centres[:, 1] - b.radii).min()) for b in self.room.bodies)
+        length, middle = RACK_LENGTH + 3.0, RACK_LENGTH / 2
+        self.clutter.append(Box((middle, 2.2, -0.05), (length, 9.0, 0.1)))
+        wall_y = low_y - float(self.rng.choice([NEAR, 0.05, 0.3]))
+        self.clutter.append(
+            Box((middle, wall_y - 0.05, 1.7), (length, 0.1, 3.4), material="plaster")
+        )
+        self.room.blocks.append(
+            (np.array([-5.0, wall_y - 0.1, 0.0]), np.array([12.0, wall_y, 3.4]))
+        )
+        for level in self.supports[1:]:
+            for x in self.rng.uniform([0.3, 2.4, 4.2], [1.2, 3.4, 5.4]):
+                self._support(float(x), level)
+        self._tray()
+        for _ in range(3):
+            self._valve()
+        self._cabinet()
+        for _ in range(3):
+            self._wire()
+        if self.rng.uniform() < 0.5:
+            foot = self.rng.uniform([0.0, RACK_DEPTH + 0.6, 0.0], [RACK_LENGTH, 5.0, 0.0])
+            low, high = foot - np.array([0.3, 0.3, 0.0]), foot + np.array([0.3, 0.3, 1.8])
+            if self.room.add_block(low, high):
+                self.clutter.append(Person(_vector(foot), yaw_deg=float(self.rng.uniform(0, 360))))
+
+    def _support(self, x: float, level: float) -> None:
+        """A beam under a level on two posts; a post alone under each pipe if it cannot be."""
+        height, width = 0.16, 0.09
+        low = np.array([x - width / 2, -0.1, level - height])
+        high = np.array([x + width / 2, RACK_DEPTH + 0.1, level])
+        if self.room.add_block(low, high):
+            self.clutter.append(Beam((x, -0.1, level), (x, RACK_DEPTH + 0.1, level), height, width))
+            for y in (-0.05, RACK_DEPTH + 0.05):
+                top = level - height
+                self._add_box(np.array([x, y, top / 2]), np.array([0.1, 0.1, top]), "red oxide")
+            return
+        for run in self.room.runs:
+            if run.direction == ALONG and abs(run.start[2] - run.radius - level) < 1e-6:
+                centre = np.array([x, run.start[1], level / 2])
+                self._add_box(centre, np.array([0.08, 0.08, level]), "red oxide")
+
+    def _add_box(self, centre: Array, size: Array, material: str) -> None:
+        if self.room.add_block(centre - size / 2, centre + size / 2):
+            self.clutter.append(Box(_vector(centre), _vector(size), material=material))
+
+    def _tray(self) -> None:
+        for _ in range(10):
+            y, z = self.rng.uniform([-0.2, 0.3], [RACK_DEPTH + 0.5, 3.1])
+            width = float(self.rng.choice([0.15, 0.3, 0.4]))
+            low = np.array([0.0, y - width / 2, z])
+            high = np.array([RACK_LENGTH, y + width / 2, z + 0.06])
+            if self.room.add_block(low, high):
+                style = list(TrayStyle)[self.rng.integers(2)]
+                self.clutter.append(Tray((0.0, y, z), (RACK_LENGTH, y, z), width, style=style))
+                return
+
+    def _valve(self) -> None:
+        """A valve around a straight of some run, where its bonnet and wheel have room."""
+        index = int(self.rng.integers(len(self.room.runs)))
+        run = self.room.runs[index]
+        if not isinstance(run.pieces[0], Straight) or run.radius > 0.12:
+            return
+        direction = unit(run.direction)
+        stem = np.array(UP if abs(direction[2]) < 0.8 else ACROSS)
+        stem = unit(stem - (stem @ direction) * direction)
+        share = self.rng.uniform(0.3, 0.7)
+        centre = np.array(run.start) + share * run.pieces[0].length * direction
+        others = [b for i, b in enumerate(self.room.bodies) if i != index]
+        r = run.radius
+        body = np.array([centre + h * stem for h in np.linspace(0.0, 4.4 * r, 8)])
+        # A sphere of the body's half diagonal must keep clear of all other pipes.
+        if all(
+            np.linalg.norm(b.centres - p, axis=1).min() > b.radii.max() + 2.0 * r
+            for b in others
+            for p in body
+        ):
+            self.clutter.append(Valve(_vector(centre), _vector(direction), _vector(stem), r))
+
+    def _cabinet(self) -> None:
+        size = self.rng.uniform([0.4, 0.3, 0.8], [1.0, 0.6, 2.0])
+        x, y = self.rng.uniform([-1.0, -0.5], [RACK_LENGTH + 0.5, RACK_DEPTH + 2.0])
+        self._add_box(np.array([x, y, size[2] / 2]), size, "grey")
+
+    def _wire(self) -> None:
+        ends = self.rng.uniform([-0.5, -0.3, 1.0], [RACK_LENGTH, RACK_DEPTH, 3.3], (2, 3))
+        along = np.linspace(0.0, 1.0, 8)[:, None]
+        points = ends[0] + along * (ends[1] - ends[0])
+        points[:, 2] -= 0.3 * (4 * along * (1 - along))[:, 0]
+        if all(self.room.is_free(p, 0.03) for p in points):
+            self.clutter.append(Wire(tuple(_vector(p) for p in points)))
+
+    def find_stations(self, n_stations: int) -> tuple[Vector, ...]:
+        """Places around the rack with room for a tripod."""
+        wished = [
+            (2.5, RACK_DEPTH + 2.6), (-1.0, 1.4), (RACK_LENGTH + 0.9, 1.4), (3.2, -0.6),
+            (0.2, RACK_DEPTH + 2.2), (5.8, RACK_DEPTH + 2.2),
+        ]  # fmt: skip
+        found: list[Vector] = []
+        spread = 0.1
+        while len(found) < n_stations:
+            x, y = wished[len(found)] + spread * self.rng.standard_normal(2)
+            position = np.array([x, y, self.rng.uniform(1.4, 1.9)])
+            is_on_floor = -1.4 < x < RACK_LENGTH + 1.4 and -2.2 < y < 6.6
+            if is_on_floor and self.room.is_free(position, 0.35):
+                found.append(_vector(position))
+                spread = 0.1
+            spread = min(1.15 * spread, 3.0)
+        return tuple(found)
