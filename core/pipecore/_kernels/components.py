@@ -1,0 +1,21 @@
+"""Connected components over groups of points."""
+
+from numba import njit
+
+from pipecore._kernels.profiles import find_root, unite
+
+
+@njit(cache=True, nogil=True)
+def unite_groups(points, starts, parents):
+    """Unite all points of each group: rows starts[g] … starts[g + 1] of `points`."""
+    for g in range(starts.shape[0] - 1):
+        first = points[starts[g]]
+        for k in range(starts[g] + 1, starts[g + 1]):
+            unite(parents, first, points[k])
+
+
+@njit(cache=True, nogil=True)
+def flatten(parents):
+    """Point every element at its root."""
+    for i in range(parents.shape[0]):
+        parents[i] = find_root(parents, i)

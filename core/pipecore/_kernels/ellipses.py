@@ -1,0 +1,320 @@
+"""Curves of a profile as oblique cuts through a cylinder: splitting and constrained fits.
+
+Points are given in the frame of their stack: (u, v) in the profile's plane, normals as
+(u, v, d) with d along the stack's direction. The plane cuts a cylinder of axis a in an
+ellipse with semi-minor axis r and semi-major axis r / |a·d|. Seen along a it is a circle;
+that circle is what is fitted.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.circles import geometric_circle, taubin_circle
+from pipecore._kernels.eigen import eigenvalues, eigenvector
+
+
+@njit(cache=True, nogil=True)
+def common_axis(normals, chosen):
+    """Direction most perpendicular to the chosen normals; eigenvalue shares of Σnnᵀ, ascending."""
+    n = 0
+    xx = xy = xz = yy = yz = zz = 0.0
+    for i in range(normals.shape[0]):
+        if chosen[i]:
+            a, b, c = normals[i, 0], normals[i, 1], normals[i, 2]
+            n += 1
+            xx += a * a
+            xy += a * b
+            xz += a * c
+            yy += b * b
+            yz += b * c
+            zz += c * c
+    if n < 3:
+        return math.nan, math.nan, math.nan, math.nan, math.nan
+    least, middle, _ = eigenvalues(xx, xy, xz, yy, yz, zz)
+    u, v, d = eigenvector(xx, xy, xz, yy, yz, zz, least)
+    if d < 0.0:
+        u, v, d = -u, -v, -d
+    return u, v, d, least / n, middle / n
+
+
+@njit(cache=True, nogil=True)
+def look_along(uv, normals, au, av, ad, x, y, mx, my):
+    """Write points and normals as seen along the axis (au, av, ad).
+
+    x runs across the axis's tilt, y along it, foreshortened. Returns (tu, tv), the
+    direction of the tilt in the profile's plane.
+    """
+    sin = math.sqrt(au * au + av * av)
+    tu, tv = (au / sin, av / sin) if sin > 1e-9 else (1.0, 0.0)
+    for i in range(uv.shape[0]):
+        u, v = uv[i, 0], uv[i, 1]
+        x[i] = tu * v - tv * u
+        y[i] = (tu * u + tv * v) * ad
+        nu, nv, nd = normals[i, 0], normals[i, 1], normals[i, 2]
+        mx[i] = tu * nv - tv * nu
+        my[i] = (tu * nu + tv * nv) * ad - nd * sin
+    return tu, tv
+
+
+@njit(cache=True, nogil=True)
+def fits_circle(x, y, mx, my, cx, cy, r, max_distance, cos_radial):
+    """Whether a point lies on a circle and its normal points to the centre."""
+    dx, dy = x - cx, y - cy
+    d = math.sqrt(dx * dx + dy * dy)
+    return abs(d - r) <= max_distance and abs(dx * mx + dy * my) >= cos_radial * d
+
+
+@njit(cache=True, nogil=True)
+def next_random(state):
+    """Next state of a linear congruential generator (Knuth's MMIX constants)."""
+    return state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)
+
+
+@njit(cache=True, nogil=True)
+def pick_pair(normals, free, state):
+    """Two free points whose normals differ clearly: state, indices, or -1 if luck fails."""
+    n = np.uint64(normals.shape[0])
+    for _ in range(12):
+        state = next_random(state)
+        i = np.int64((state >> np.uint64(33)) % n)
+        state = next_random(state)
+        j = np.int64((state >> np.uint64(33)) % n)
+        if not free[i] or not free[j]:
+            continue
+        cos = (
+            normals[i, 0] * normals[j, 0]
+            + normals[i, 1] * normals[j, 1]
+            + normals[i, 2] * normals[j, 2]
+        )
+        if abs(cos) < 0.94:
+            return state, i, j
+    return state, -1, -1
+
+
+@njit(cache=True, nogil=True)
+def best_circle(
+    uv, normals, free, tolerance, cos_radial, min_cos_tilt, max_radius, n_trials, seed, inliers
+):
+    """Find the cylinder cut with most inliers among the `free` points.
+
+    Two points with their normals give an axis (the normals' cross product) and, seen
+    along it, a centre (where the normals meet). Writes the inliers, returns their number.
+    """
+    n = uv.shape[0]
+    x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    weights = np.empty(n)
+    best = 0
+    best_au = best_av = best_ad = best_cx = best_cy = best_r = 0.0
+    state = np.uint64(seed) * np.uint64(2862933555777941757) + np.uint64(3037000493)
+    for _ in range(n_trials):
+        state, i, j = pick_pair(normals, free, state)
+        if i < 0:
+            continue
+        au = normals[i, 1] * normals[j, 2] - normals[i, 2] * normals[j, 1]
+        av = normals[i, 2] * normals[j, 0] - normals[i, 0] * normals[j, 2]
+        ad = normals[i, 0] * normals[j, 1] - normals[i, 1] * normals[j, 0]
+        length = math.sqrt(au * au + av * av + ad * ad)
+        if ad < 0.0:
+            length = -length
+        au, av, ad = au / length, av / length, ad / length
+        if ad < min_cos_tilt:
+            continue
+        look_along(uv, normals, au, av, ad, x, y, mx, my)
+        sin = mx[i] * my[j] - my[i] * mx[j]
+        if abs(sin) < 0.2:
+            continue
+        t = ((x[j] - x[i]) * my[j] - (y[j] - y[i]) * mx[j]) / sin
+        cx, cy = x[i] + t * mx[i], y[i] + t * my[i]
+        r1, r2 = abs(t), math.sqrt((x[j] - cx) ** 2 + (y[j] - cy) ** 2)
+        r = 0.5 * (r1 + r2)
+        if abs(r1 - r2) > 0.25 * r or r > max_radius or r < tolerance:
+            continue
+        count = 0
+        for k in range(n):
+            if free[k] and fits_circle(
+                x[k], y[k], mx[k], my[k], cx, cy, r, tolerance + 0.05 * r, cos_radial
+            ):
+                count += 1
+        if count > best:
+            best, best_cx, best_cy, best_r = count, cx, cy, r
+            best_au, best_av, best_ad = au, av, ad
+    if best == 0:
+        return 0
+    au, av, ad, cx, cy, r = best_au, best_av, best_ad, best_cx, best_cy, best_r
+    for pass_ in range(3):
+        look_along(uv, normals, au, av, ad, x, y, mx, my)
+        if pass_ > 0:
+            cx, cy, r = taubin_circle(x, y, weights)
+            if not r > 0.0 or r > max_radius:
+                return 0
+        reach = tolerance + (0.05 * r if pass_ == 0 else 0.0)
+        best = 0
+        for k in range(n):
+            inliers[k] = free[k] and fits_circle(
+                x[k], y[k], mx[k], my[k], cx, cy, r, reach, cos_radial
+            )
+            weights[k] = 1.0 if inliers[k] else 0.0
+            best += inliers[k]
+        if best < 5:
+            return 0
+        if pass_ < 2:
+            au, av, ad, _, _ = common_axis(normals, inliers)
+            if not ad >= min_cos_tilt:
+                return 0
+    return best
+
+
+@njit(cache=True, nogil=True)
+def share_on_one_circle(uv, normals, tolerance, min_cos_tilt):
+    """Share of a curve's points on the circle that fits them all best, seen along their axis."""
+    n = uv.shape[0]
+    chosen = np.ones(n, np.bool_)
+    au, av, ad, _, _ = common_axis(normals, chosen)
+    if not ad >= min_cos_tilt:
+        return 0.0
+    x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    look_along(uv, normals, au, av, ad, x, y, mx, my)
+    weights = np.ones(n)
+    cx, cy, r = taubin_circle(x, y, weights)
+    if not r > 0.0:
+        return 0.0
+    cx, cy, r = geometric_circle(x, y, cx, cy, r, 4.0 * tolerance, weights, 5)
+    count = 0
+    for k in range(n):
+        count += fits_circle(x[k], y[k], mx[k], my[k], cx, cy, r, 1.5 * tolerance, 0.8)
+    return count / n
+
+
+@njit(cache=True, nogil=True)
+def split_curves(
+    uv,
+    normals,
+    curve_starts,
+    start,
+    stop,
+    min_points,
+    tolerance,
+    cos_radial,
+    min_cos_tilt,
+    max_radius,
+    n_trials,
+    max_pieces,
+    piece,
+):
+    """Split curves start … stop that are not one cut through a cylinder.
+
+    Writes the piece of each point within its curve: 0 for points of no piece, and for
+    all points of a curve that needs no splitting; 1, 2, … for the pieces.
+    """
+    for c in range(start, stop):
+        a, b = curve_starts[c], curve_starts[c + 1]
+        n = b - a
+        if n < min_points:
+            continue
+        if share_on_one_circle(uv[a:b], normals[a:b], tolerance, min_cos_tilt) > 0.95:
+            continue
+        free = np.ones(n, np.bool_)
+        inliers = np.empty(n, np.bool_)
+        n_free = n
+        for number in range(1, max_pieces + 1):
+            count = best_circle(
+                uv[a:b],
+                normals[a:b],
+                free,
+                tolerance,
+                cos_radial,
+                min_cos_tilt,
+                max_radius,
+                n_trials,
+                # The same curve is split the same way wherever it stands in the list.
+                n + number,
+                inliers,
+            )
+            if count < min_points:
+                break
+            for k in range(n):
+                if inliers[k]:
+                    piece[a + k] = number
+                    free[k] = False
+            n_free -= count
+            if n_free < min_points:
+                break
+
+
+@njit(cache=True, nogil=True)
+def covered_arc(angles, max_gap):
+    """Arc that sorted angles cover; gaps up to `max_gap` count as covered."""
+    n = angles.shape[0]
+    uncovered = 0.0
+    for i in range(n):
+        gap = angles[i] - angles[i - 1] if i > 0 else angles[0] + 2.0 * math.pi - angles[n - 1]
+        if gap > max_gap:
+            uncovered += gap
+    return 2.0 * math.pi - uncovered
+
+
+N_FIT_COLUMNS = 13
+"""Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points; slope; λ1, λ2; share of radial normals."""
+
+
+@njit(cache=True, nogil=True)
+def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits):
+    """Fit a cylinder cut to each of the curves start … stop; write `N_FIT_COLUMNS` values.
+
+    The slope is the mean of n·a with n outward: 0 on a cylinder, constant on a cone,
+    proportional to the distance from the centre on a sphere.
+    """
+    for c in range(start, stop):
+        a, b = curve_starts[c], curve_starts[c + 1]
+        n = b - a
+        fits[c, :] = math.nan
+        if n < 5:
+            continue
+        points, vectors = uv[a:b], normals[a:b]
+        chosen = np.ones(n, np.bool_)
+        x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+        weights = np.ones(n)
+        au, av, ad, l1, l2 = common_axis(vectors, chosen)
+        if math.isnan(ad):
+            continue
+        tu, tv = look_along(points, vectors, au, av, ad, x, y, mx, my)
+        cx, cy, r = taubin_circle(x, y, weights)
+        if not r > 0.0:
+            continue
+        cx, cy, r = geometric_circle(x, y, cx, cy, r, 4.0 * tolerance, weights, 8)
+        if not r > 0.0:
+            continue
+        total = ss = slope = 0.0
+        n_in = n_radial = 0
+        angles = np.empty(n)
+        for k in range(n):
+            dx, dy = x[k] - cx, y[k] - cy
+            d = math.sqrt(dx * dx + dy * dy)
+            if weights[k] < 0.1 or d == 0.0:
+                continue
+            angles[n_in] = math.atan2(dy, dx)
+            n_in += 1
+            total += weights[k]
+            ss += weights[k] * (d - r) ** 2
+            radial = (dx * mx[k] + dy * my[k]) / d
+            n_radial += abs(radial) > 0.9
+            along = vectors[k, 0] * au + vectors[k, 1] * av + vectors[k, 2] * ad
+            slope += along if radial > 0.0 else -along
+        if n_in < 5:
+            continue
+        sorted_angles = np.sort(angles[:n_in])
+        arc = covered_arc(sorted_angles, max(max_gap / r, 0.35))
+        # Back from the view along the axis to the profile's plane.
+        along_tilt = cy / ad
+        fits[c, 0] = -tv * cx + tu * along_tilt
+        fits[c, 1] = tu * cx + tv * along_tilt
+        fits[c, 2], fits[c, 3], fits[c, 4] = au, av, ad
+        fits[c, 5] = r
+        fits[c, 6] = math.sqrt(ss / total)
+        fits[c, 7] = arc
+        fits[c, 8] = n_in
+        fits[c, 9] = slope / n_in
+        fits[c, 10], fits[c, 11] = l1, l2
+        fits[c, 12] = n_radial / n

@@ -1,0 +1,133 @@
+"""Local surface properties of points from their neighbours, found in a hashed grid of cells."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.eigen import eigenvalues, eigenvector
+from pipecore._kernels.voxels import EMPTY, slot_of
+
+
+@njit(cache=True, nogil=True)
+def fit_planes(
+    xyz,
+    cells,
+    cell_starts,
+    table_keys,
+    table_ids,
+    n_y,
+    n_z,
+    radius,
+    min_neighbours,
+    start,
+    stop,
+    normals,
+    residuals,
+    spacings,
+):
+    """Fit a plane to the neighbours of points start … stop within `radius`.
+
+    Where there are fewer than `min_neighbours`, within twice and four times the radius.
+    `xyz` is sorted by cell; `cells` holds each point's cell (ix, iy, iz), whose edge is
+    `radius`. Writes the normal, the root mean square distance from the plane, and the
+    spacing of the points; nan where there are too few.
+    """
+    mask = np.int64(table_keys.shape[0] - 1)
+    for i in range(start, stop):
+        px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        normals[i, 0] = normals[i, 1] = normals[i, 2] = math.nan
+        residuals[i] = spacings[i] = math.nan
+        for reach in (1, 2, 4):
+            r2 = (reach * radius) ** 2
+            n = 0
+            sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
+            for dx in range(-reach, reach + 1):
+                for dy in range(-reach, reach + 1):
+                    for dz in range(-reach, reach + 1):
+                        key = ((cells[i, 0] + dx) * n_y + cells[i, 1] + dy) * n_z + cells[i, 2] + dz
+                        slot = slot_of(key, table_keys, mask)
+                        if table_keys[slot] == EMPTY:
+                            continue
+                        c = table_ids[slot]
+                        for j in range(cell_starts[c], cell_starts[c + 1]):
+                            x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
+                            if x * x + y * y + z * z <= r2:
+                                n += 1
+                                sx += x
+                                sy += y
+                                sz += z
+                                sxx += x * x
+                                sxy += x * y
+                                sxz += x * z
+                                syy += y * y
+                                syz += y * z
+                                szz += z * z
+            if n >= min_neighbours:
+                mx, my, mz = sx / n, sy / n, sz / n
+                xx, xy, xz = sxx / n - mx * mx, sxy / n - mx * my, sxz / n - mx * mz
+                yy, yz, zz = syy / n - my * my, syz / n - my * mz, szz / n - mz * mz
+                least, _, _ = eigenvalues(xx, xy, xz, yy, yz, zz)
+                x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
+                normals[i, 0], normals[i, 1], normals[i, 2] = x, y, z
+                residuals[i] = math.sqrt(max(least, 0.0) * n / (n - 3.0))
+                spacings[i] = reach * radius * math.sqrt(math.pi / n)
+                break
+
+
+@njit(cache=True, nogil=True)
+def fit_local_axes(
+    xyz,
+    normals,
+    cells,
+    cell_starts,
+    table_keys,
+    table_ids,
+    n_y,
+    n_z,
+    radius,
+    sample,
+    start,
+    stop,
+    axes,
+    spreads,
+):
+    """Find the direction that is most perpendicular to the normals around sampled points.
+
+    Writes, for sample start … stop, the eigenvector of Σ n nᵀ with the smallest
+    eigenvalue, and the eigenvalues in ascending order divided by their sum.
+    """
+    mask = np.int64(table_keys.shape[0] - 1)
+    for k in range(start, stop):
+        i = sample[k]
+        px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        n = 0
+        xx = xy = xz = yy = yz = zz = 0.0
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                for dz in range(-1, 2):
+                    key = ((cells[i, 0] + dx) * n_y + cells[i, 1] + dy) * n_z + cells[i, 2] + dz
+                    slot = slot_of(key, table_keys, mask)
+                    if table_keys[slot] == EMPTY:
+                        continue
+                    c = table_ids[slot]
+                    for j in range(cell_starts[c], cell_starts[c + 1]):
+                        x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
+                        if x * x + y * y + z * z <= radius * radius:
+                            a, b, d = normals[j, 0], normals[j, 1], normals[j, 2]
+                            if math.isnan(a):
+                                continue
+                            n += 1
+                            xx += a * a
+                            xy += a * b
+                            xz += a * d
+                            yy += b * b
+                            yz += b * d
+                            zz += d * d
+        axes[k, 0] = axes[k, 1] = axes[k, 2] = math.nan
+        spreads[k, 0] = spreads[k, 1] = spreads[k, 2] = math.nan
+        if n >= 6:
+            least, middle, largest = eigenvalues(xx, xy, xz, yy, yz, zz)
+            x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
+            axes[k, 0], axes[k, 1], axes[k, 2] = x, y, z
+            spreads[k, 0], spreads[k, 1], spreads[k, 2] = least / n, middle / n, largest / n

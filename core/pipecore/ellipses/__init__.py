@@ -1,0 +1,205 @@
+"""Ellipses of the curves in the profiles, and which of them to believe (paper, 3.3.3 and 3.3.4)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels import ellipses as kernels
+from pipecore.ellipses.direct import PlaneEllipses, fit_direct_ellipses
+from pipecore.ellipses.uncertainty import radius_sd_factor
+from pipecore.parallel import for_chunks
+from pipecore.profiles import Curves
+from pipecore.progress import Progress
+from pipecore.settings import EllipseSettings, ElementSettings
+from pipecore.surface import Surface
+
+__all__ = [
+    "Ellipses",
+    "PlaneEllipses",
+    "fit_direct_ellipses",
+    "fit_ellipses",
+    "radius_sd_factor",
+    "akaike",
+]
+
+Array = NDArray[np.float64]
+
+FREE_FIT_ARC = np.deg2rad(240.0)
+"""A free ellipse is believed only where the points cover at least this arc."""
+
+LINE_PARAMETERS, CIRCLE_PARAMETERS, ELLIPSE_PARAMETERS = 2, 3, 5
+
+
+@dataclass(frozen=True, eq=False)
+class Ellipses:
+    """Accepted ellipses of all stacks, one per row.
+
+    Parameters
+    ----------
+    stack_id, profile_index : ndarray of int32, shape (m,)
+    centre : ndarray, shape (m, 3)
+        Local coordinates.
+    axis : ndarray, shape (m, 3)
+        Unit direction of the pipe there, from the points' normals.
+    radius, radius_sd : ndarray, shape (m,)
+        Of the circle seen along `axis`, metres.
+    slope : ndarray, shape (m,)
+        Mean of the outward normals' component along `axis`: 0 on a cylinder.
+    arc : ndarray, shape (m,)
+        Radians.
+    n_points : ndarray of int32, shape (m,)
+    rms : ndarray, shape (m,)
+    semi_minor, semi_major : ndarray, shape (m,)
+        Of the free direct fit where the arc carries it, else of the constrained ellipse.
+    major_direction : ndarray, shape (m, 3)
+        Unit vector of the major axis.
+    aic_line, aic_ellipse : ndarray, shape (m,)
+    """
+
+    stack_id: NDArray[np.int32]
+    profile_index: NDArray[np.int32]
+    centre: Array
+    axis: Array
+    radius: Array
+    radius_sd: Array
+    slope: Array
+    arc: Array
+    n_points: NDArray[np.int32]
+    rms: Array
+    semi_minor: Array
+    semi_major: Array
+    major_direction: Array
+    aic_line: Array
+    aic_ellipse: Array
+
+    def __len__(self) -> int:
+        """Return the number of ellipses."""
+        return len(self.radius)
+
+    def __getitem__(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> "Ellipses":
+        """Return the given rows."""
+        return Ellipses(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    @classmethod
+    def concatenate(cls, tables: "Sequence[Ellipses]") -> "Ellipses":
+        """Return one table with the rows of all; at least one table."""
+        return cls(*(np.concatenate([getattr(t, f.name) for t in tables]) for f in fields(cls)))
+
+
+def akaike(n_parameters: int, n_points: NDArray[np.integer], rss: Array) -> Array:
+    """Akaike's information criterion, equation 4 of the paper: 2k + n ln(2π·RSS/n)."""
+    return 2 * n_parameters + n_points * np.log(2 * np.pi * np.maximum(rss, 1e-18) / n_points)
+
+
+def fit_ellipses(
+    curves: Curves,
+    surface: Surface,
+    settings: EllipseSettings,
+    sizes: ElementSettings,
+    progress: Progress,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> Ellipses:
+    """Fit an ellipse to every curve of a stack and keep those that are one.
+
+    The ellipse is constrained: an oblique cut through a cylinder whose direction comes
+    from the points' normals. It is kept if its flattening, arc, residual and radius are
+    within bounds, its normals point to its centre, and Akaike's criterion prefers it to
+    a line.
+    """
+    fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
+    tolerance = max(0.25 * surface.voxel, 3.0 * surface.noise, 0.002)
+
+    def work(start: int, stop: int) -> None:
+        kernels.fit_curves(
+            curves.uv, curves.normals, curves.starts, start, stop,
+            tolerance, 4.0 * surface.voxel, fits,
+        )  # fmt: skip
+
+    for_chunks(work, len(curves), 512, "ellipses", progress, span)
+    tilt_cos, radius, rms, arc = fits[:, 4], fits[:, 5], fits[:, 6], fits[:, 7]
+    max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
+    with np.errstate(invalid="ignore"):
+        accepted = (
+            (1.0 - tilt_cos <= settings.max_flattening)
+            & (arc >= np.deg2rad(settings.min_arc_deg))
+            & (rms <= max_rms)
+            & (rms <= 0.12 * radius)
+            & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
+            & (radius <= 1.2 * sizes.max_radius_mm / 1e3)
+            & (fits[:, 12] >= MIN_RADIAL)
+            & (fits[:, 10] <= MAX_OFF_AXIS * fits[:, 11])
+        )
+    kept = np.flatnonzero(accepted)
+    fits = fits[kept]
+    line_rss, free = _competing_fits(curves, kept)
+    n_points = np.diff(curves.starts)[kept]
+    aic_line = akaike(LINE_PARAMETERS, n_points, line_rss)
+    circle_rss = fits[:, 6] ** 2 * n_points
+    is_free = (fits[:, 7] >= FREE_FIT_ARC) & np.isfinite(free.semi_minor)
+    aic_ellipse = np.where(
+        is_free,
+        akaike(ELLIPSE_PARAMETERS, n_points, free.rss),
+        akaike(CIRCLE_PARAMETERS, n_points, circle_rss),
+    )
+    ellipses = _to_space(curves, kept, fits, free, is_free, aic_line, aic_ellipse)
+    return ellipses[aic_ellipse < aic_line]
+
+
+MIN_RADIAL = 0.75
+"""Share of a curve's normals that must point to the centre."""
+MAX_OFF_AXIS = 0.35
+"""Largest ratio of the two smaller eigenvalues of Σnnᵀ: above, the axis is not defined."""
+
+
+def _competing_fits(curves: Curves, kept: NDArray[np.intp]) -> tuple[Array, PlaneEllipses]:
+    """Residual sums of squares of a line, and free ellipses, for the kept curves."""
+    if len(kept) == 0:
+        return np.empty(0), PlaneEllipses(np.empty((0, 2)), *(np.empty(0) for _ in range(4)))
+    sizes = np.diff(curves.starts)[kept]
+    starts = np.concatenate([[0], np.cumsum(sizes)])
+    rows = np.arange(starts[-1]) + np.repeat(curves.starts[kept] - starts[:-1], sizes)
+    uv = curves.uv[rows]
+    group = np.repeat(np.arange(len(kept)), sizes)
+    centred = uv - (np.add.reduceat(uv, starts[:-1]) / sizes[:, None])[group]
+    uu, uv_, vv = (
+        np.add.reduceat(p, starts[:-1])
+        for p in (centred[:, 0] ** 2, centred[:, 0] * centred[:, 1], centred[:, 1] ** 2)
+    )
+    line_rss = 0.5 * (uu + vv) - np.hypot(0.5 * (uu - vv), uv_)
+    return line_rss, fit_direct_ellipses(uv, starts)
+
+
+def _to_space(
+    curves: Curves,
+    kept: NDArray[np.intp],
+    fits: Array,
+    free: PlaneEllipses,
+    is_free: NDArray[np.bool_],
+    aic_line: Array,
+    aic_ellipse: Array,
+) -> Ellipses:
+    frame = curves.frame
+    centre = fits[:, :2] @ frame[:2] + curves.mid_plane(kept)[:, None] * frame[2]
+    axis = fits[:, 2:5] @ frame
+    radius, arc, n_points = fits[:, 5], fits[:, 7], fits[:, 8].astype(np.int32)
+    # The major axis of the constrained ellipse runs along the axis's tilt.
+    angle = np.where(is_free, free.angle, np.arctan2(fits[:, 3], fits[:, 2]))
+    return Ellipses(
+        stack_id=np.full(len(kept), curves.stack.stack_id, np.int32),
+        profile_index=curves.profile_index[kept],
+        centre=centre,
+        axis=axis,
+        radius=radius,
+        radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),
+        slope=fits[:, 9],
+        arc=arc,
+        n_points=n_points,
+        rms=fits[:, 6],
+        semi_minor=np.where(is_free, free.semi_minor, radius),
+        semi_major=np.where(is_free, free.semi_major, radius / fits[:, 4]),
+        major_direction=np.cos(angle)[:, None] * frame[0] + np.sin(angle)[:, None] * frame[1],
+        aic_line=aic_line,
+        aic_ellipse=aic_ellipse,
+    )

@@ -1,0 +1,56 @@
+"""Stacks: the cloud cut into parallel profiles, in several directions (paper, section 3.1)."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipecore.geometry import unit
+from pipecore.progress import Progress
+from pipecore.settings import DirectionPreset, StackSettings
+from pipecore.stacks.directions import AXES, DIAGONALS, automatic_directions
+from pipecore.surface import Surface
+from pipecore.types import Stack
+
+__all__ = ["choose_stacks", "preset_directions"]
+
+WIDTH = 2.0
+"""Automatic profile width, in voxels."""
+
+
+def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
+    """Directions of a preset that does not depend on the cloud."""
+    match preset:
+        case DirectionPreset.AXES:
+            return list(AXES)
+        case DirectionPreset.AXES_AND_DIAGONALS:
+            return [*AXES, *DIAGONALS]
+        case _:
+            return []
+
+
+def choose_stacks(
+    surface: Surface, settings: StackSettings, progress: Progress
+) -> tuple[Stack, ...]:
+    """Return the stacks that the settings ask for: the preset's, then the user's own."""
+    width = settings.width_mm / 1e3 or WIDTH * surface.voxel
+    named: list[tuple[str, ArrayLike, float]] = []
+    if settings.preset is DirectionPreset.AUTOMATIC:
+        found = automatic_directions(surface, progress)
+        named += [(f"auto {i}", d, width) for i, d in enumerate(found, start=1)]
+    else:
+        named += [(describe_direction(d), d, width) for d in preset_directions(settings.preset)]
+    for x, y, z, *own_width in settings.directions:
+        own = own_width[0] / 1e3 if own_width and own_width[0] else width
+        named.append((describe_direction((x, y, z)), (x, y, z), own))
+    return tuple(
+        Stack(i, unit(direction), stack_width, 0.0, name)
+        for i, (name, direction, stack_width) in enumerate(named, start=1)
+    )
+
+
+def describe_direction(direction: ArrayLike) -> str:
+    """Name a direction: X, Y, Z, or its components."""
+    x, y, z = unit(direction)
+    for name, component in zip("XYZ", (x, y, z), strict=True):
+        if abs(component) > 1 - 1e-9:
+            return name
+    return f"({x:.2f}, {y:.2f}, {z:.2f})"

@@ -1,0 +1,98 @@
+"""Directions in which stacks are cut."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels import neighbours
+from pipecore.parallel import for_chunks
+from pipecore.progress import Progress
+from pipecore.surface import Surface
+from pipecore.surface.grid import CellGrid
+
+Array = NDArray[np.float64]
+
+AXES = np.eye(3)
+DIAGONALS = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]]) / np.sqrt(3.0)
+
+N_SAMPLES = 60_000
+REACH = 6.0
+"""Radius of the neighbourhood of a local axis, in voxels."""
+CURVED = 0.02
+"""Share of the second eigenvalue of Σnnᵀ above which a surface counts as curved."""
+COVER_COS = np.cos(np.deg2rad(24.0))
+"""A local axis is well cut by a stack within this angle of it."""
+MAX_DIRECTIONS = 16
+MIN_SHARE = 0.004
+"""Local axes that are rarer than this get no direction of their own."""
+
+
+def local_axes(surface: Surface, progress: Progress) -> Array:
+    """Directions of the local axis at sampled curved places of the surface, shape (k, 3)."""
+    usable = np.flatnonzero(~np.isnan(surface.normals[:, 0]))
+    if len(usable) == 0:
+        return np.empty((0, 3))
+    radius = REACH * surface.voxel
+    xyz, normals = surface.xyz[usable], surface.normals[usable]
+    grid = CellGrid.build(xyz, radius)
+    xyz, normals = xyz[grid.order], normals[grid.order]
+    sample = np.unique(np.linspace(0, len(xyz) - 1, N_SAMPLES).astype(np.intp))
+    axes, spreads = np.empty((len(sample), 3)), np.empty((len(sample), 3))
+
+    def work(start: int, stop: int) -> None:
+        neighbours.fit_local_axes(
+            xyz, normals, *grid.lookup, radius, sample, start, stop, axes, spreads
+        )
+
+    for_chunks(work, len(sample), 2_000, "directions", progress)
+    is_curved = (spreads[:, 1] > CURVED) & (spreads[:, 0] < 0.25 * spreads[:, 1])
+    return axes[is_curved]
+
+
+def cover_directions(axes: Array) -> list[Array]:
+    """Choose few directions so that nearly every axis is within the cover angle of one.
+
+    Greedy: the direction with most axes around it, moved to their mean, then the same
+    for the axes left over.
+    """
+    chosen: list[Array] = []
+    left = axes
+    candidates = _hemisphere(400)
+    least = max(20, MIN_SHARE * len(axes))
+    while len(chosen) < MAX_DIRECTIONS and len(left) > least:
+        # Towards the peak: weights fall off well inside the cover angle.
+        weight = np.maximum((left @ candidates.T) ** 2 - COVER_COS**2, 0.0).sum(axis=0)
+        direction = candidates[np.argmax(weight)]
+        for _ in range(3):
+            near = left[np.abs(left @ direction) > np.cos(np.deg2rad(12.0))]
+            if len(near) == 0:
+                break
+            direction = np.linalg.eigh(near.T @ near)[1][:, -1]
+        covered = np.abs(left @ direction) > COVER_COS
+        if covered.sum() < least:
+            break
+        chosen.append(_canonical(direction))
+        left = left[~covered]
+    return chosen
+
+
+def automatic_directions(surface: Surface, progress: Progress) -> list[Array]:
+    """Directions along which the cloud's own surfaces run, most frequent first.
+
+    Where the cloud shows no curved surface, the axes and diagonals.
+    """
+    chosen = cover_directions(local_axes(surface, progress))
+    return chosen or [*AXES, *DIAGONALS]
+
+
+def _hemisphere(n: int) -> Array:
+    """About `n` directions spread evenly over a half sphere (Fibonacci lattice)."""
+    k = np.arange(n) + 0.5
+    z = k / n
+    azimuth = np.pi * (1 + 5**0.5) * k
+    rho = np.sqrt(1 - z * z)
+    return np.stack([rho * np.cos(azimuth), rho * np.sin(azimuth), z], axis=1)
+
+
+def _canonical(direction: Array) -> Array:
+    """Return the direction with its largest component positive."""
+    return direction * np.sign(direction[np.argmax(np.abs(direction))])

@@ -1,0 +1,76 @@
+"""The thinned cloud: one mean point per cube of a grid."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipecore._kernels import voxels
+from pipecore.progress import Progress, in_chunks
+from pipecore.settings import ThinningSettings
+from pipecore.surface.grid import cell_numbers, empty_table
+from pipecore.types import PointCloud
+
+SMALLEST_VOXEL = 0.003
+"""Thinning finer than 3 mm keeps noise, not shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class ThinnedCloud:
+    """One point per occupied voxel: the mean of the points in it.
+
+    Parameters
+    ----------
+    xyz : ndarray
+        Means in local coordinates, float64, shape (m, 3), in the order of the voxels.
+    parent : ndarray of int32, shape (n,)
+        Index of the thinned point of each point of the cloud.
+    voxel : float
+        Edge of the voxels, metres.
+    """
+
+    xyz: NDArray[np.float64]
+    parent: NDArray[np.int32]
+    voxel: float
+
+
+def median_spacing(xyz: NDArray[np.floating], n_sample: int = 4000, n_neighbours: int = 8) -> float:
+    """Typical distance between neighbouring points on the scanned surfaces, metres.
+
+    From the radius of the disc that holds `n_neighbours` points around sampled points:
+    close pairs of overlapping scans do not make it smaller than it is.
+    """
+    tree = cKDTree(xyz)
+    sample = xyz[np.linspace(0, len(xyz) - 1, min(n_sample, len(xyz))).astype(np.intp)]
+    n_neighbours = min(n_neighbours, len(xyz) - 1)
+    reach, _ = tree.query(sample, n_neighbours + 1)
+    return float(np.median(reach[:, -1]) * np.sqrt(np.pi / (n_neighbours + 1)))
+
+
+def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> ThinnedCloud:
+    """Average the points of `cloud` in voxels.
+
+    The voxels' edge is the setting's, or the median spacing of the points where that is
+    automatic. The result does not depend on the order of the points.
+    """
+    progress.update("thinning", 0.0)
+    xyz = cloud.xyz
+    edge = settings.voxel_mm / 1e3 or max(median_spacing(xyz), SMALLEST_VOXEL)
+    keys, low, _, _ = cell_numbers(xyz, edge)
+    parent = np.empty(len(xyz), np.int32)
+    table_keys, table_ids = empty_table(len(xyz))
+    n_voxels = 0
+    for start, stop in in_chunks(len(xyz), 2_000_000, "thinning", progress):
+        n_voxels = voxels.number_voxels(
+            keys[start:stop], table_keys, table_ids, parent[start:stop], n_voxels
+        )
+    # In the order of the voxels, not in that of the points.
+    key_of_voxel = np.empty(n_voxels, np.int64)
+    key_of_voxel[parent] = keys
+    rank = np.empty(n_voxels, np.int32)
+    rank[np.argsort(key_of_voxel)] = np.arange(n_voxels, dtype=np.int32)
+    parent = rank[parent]
+    sums, counts = np.zeros((n_voxels, 3), np.int64), np.zeros(n_voxels, np.int64)
+    voxels.sum_voxels(xyz, parent, low, sums, counts)
+    return ThinnedCloud(low + sums / (1e6 * counts[:, None]), parent, edge)
