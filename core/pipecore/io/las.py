@@ -142,7 +142,7 @@ def _check_chunk_table(file: BinaryIO, path: Path, start: int, size: int) -> Non
 
 def _check_chunks(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> None:
     """Refuse chunks that are larger than the file before the decoder makes room for them."""
-    import lazrs  # noqa: PLC0415
+    import lazrs  # type: ignore[import-untyped]  # noqa: PLC0415
 
     packing = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
     if packing.item_size() != header.point_format.size:

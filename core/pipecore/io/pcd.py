@@ -114,14 +114,14 @@ def _text_chunks(
     by_role: Callable[[Callable[[int], Column]], Callable[[str], Column]],
 ) -> Iterator[Chunk]:
     start = file.tell()
-    sample = file.read(4096).decode("latin-1").splitlines()[:20]
+    first_line = file.readline(LONGEST_HEADER).decode("latin-1")
     file.seek(start)
     ends = np.cumsum(header.counts)
     # Text carries more than a field's declared size: coordinates are taken as they stand.
     table = Table(
         file,
         path,
-        sniff_dialect(sample[:-1] or sample),
+        sniff_dialect(first_line),
         tuple(range(int(ends[-1]))),
         int(ends[-1]),
         header.n_lines,

@@ -1,5 +1,6 @@
 """The formats that can be read, and which of them a file is in."""
 
+import codecs
 import importlib
 import re
 from collections.abc import Callable
@@ -95,6 +96,8 @@ def identify(path: Path) -> Format:
     for candidate in _FORMATS:
         if candidate.signature is not None and candidate.signature.match(head):
             return candidate
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise ReadError(f"“{path.name}” is UTF-16 text; save it as UTF-8 or plain text.")
     by_ending = next((f for f in _FORMATS if path.suffix.lower() in f.endings), None)
     if b"\0" not in head and by_ending is not None and by_ending.module in ("text", "pcd"):
         return by_ending

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pipecore.errors import ReadError
 from pipecore.io.reading import FARTHEST
@@ -141,6 +140,8 @@ def estimate_spacing(sample: Array, n_points: int) -> float:
 
 
 def _median_spacing(points: Array) -> float:
+    from scipy.spatial import cKDTree  # noqa: PLC0415  (slow to import)
+
     if len(points) < 2:
         return float("nan")
     local = points - points[0]

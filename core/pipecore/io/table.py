@@ -1,7 +1,7 @@
 """Tables of numbers in text: how their values are separated, and their rows block by block."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -28,33 +28,34 @@ class Dialect:
     delimiter : str, optional
         None for white space.
     has_decimal_commas : bool
+    closes_lines : bool
+        Whether a delimiter stands behind the last value too.
     """
 
     delimiter: str | None = None
     has_decimal_commas: bool = False
+    closes_lines: bool = False
 
     def split(self, line: str) -> list[str]:
         """Return the values of a line of data as `float` reads them."""
         if self.has_decimal_commas:
             line = line.replace(",", ".")
         values = [v.strip().strip('"') for v in line.strip().split(self.delimiter)]
-        # A delimiter at the end of the line closes the last value and opens no further one.
-        return values[:-1] if self.delimiter and values[-1] == "" else values
+        return values[:-1] if self.closes_lines and values[-1] == "" else values
 
 
-def sniff_dialect(lines: Sequence[str]) -> Dialect:
-    """Return how the values of some lines of data are separated."""
-    text = "\n".join(lines)
-    if ";" in text:
-        return Dialect(";", has_decimal_commas="," in text)
-    if "," not in text:
+def sniff_dialect(line: str) -> Dialect:
+    """Return how the values of a line of data are separated."""
+    if ";" in line:
+        return Dialect(";", has_decimal_commas=True, closes_lines=line.rstrip().endswith(";"))
+    if "," not in line:
         return Dialect()
     # “1,5 2,5 3,5” against “1.5, 2.5, 3.5” and “1,2,3”.
     decimal = re.compile(r'"?[-+]?\d*,\d+([eE][-+]?\d+)?"?|[-+]?\d+')
-    rows = [line.split() for line in lines]
-    if all(len(row) >= 3 and all(decimal.fullmatch(v) for v in row) for row in rows):
+    values = line.split()
+    if len(values) >= 3 and all(map(decimal.fullmatch, values)):
         return Dialect(None, has_decimal_commas=True)
-    return Dialect(",")
+    return Dialect(",", closes_lines=line.rstrip().endswith(","))
 
 
 def is_number(value: str) -> bool:
@@ -141,7 +142,11 @@ class Table:
         try:
             return self._numbers(lines)
         except ValueError:
-            # Something is no row of numbers: find it, one by one.
+            # Something is no row of numbers: find it, by halves, then one by one.
+            half = len(lines) // 2
+            if half > 500:
+                parts = (lines[:half], n_lines_before), (lines[half:], n_lines_before + half)
+                return np.concatenate([self._parse(*part) for part in parts])
             rows = []
             for i, line in enumerate(lines):
                 if is_comment(line):
@@ -166,8 +171,8 @@ class Table:
         if self.dialect.has_decimal_commas:
             lines = [line.replace(",", ".") for line in lines]
         # Without `usecols` numpy also holds that all rows are equally long.
-        is_whole_row = len(self.columns) == self.n_columns
-        return np.loadtxt(
+        is_whole_row = len(self.columns) == self.n_columns and not self.dialect.closes_lines
+        rows = np.loadtxt(
             lines,
             dtype=np.float64,
             comments=None,
@@ -175,7 +180,10 @@ class Table:
             usecols=None if is_whole_row else self.columns,
             quotechar='"',
             ndmin=2,
-        )[:, : None if is_whole_row else len(self.columns)].reshape(-1, len(self.columns))
+        )
+        if rows.shape[1] != len(self.columns):
+            raise ValueError("all rows are longer or shorter")
+        return rows
 
 
 def _shortened(line: str) -> str:

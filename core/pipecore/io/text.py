@@ -1,5 +1,6 @@
 """Points in text: PTS, XYZ, TXT, CSV, ASC."""
 
+import codecs
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -74,8 +75,6 @@ def _chunks(file: BinaryIO, path: Path, layout: _Layout) -> Iterator[Chunk]:
 
 def _find_layout(file: BinaryIO, path: Path) -> _Layout:
     head = file.read(HEAD_BYTES)
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise ReadError(f"“{path.name}” is UTF-16 text; save it as UTF-8 or plain text.")
     raw_lines = head.splitlines(keepends=True)
     if len(head) == HEAD_BYTES and len(raw_lines) > 1:
         raw_lines.pop()  # It may be cut.
@@ -96,7 +95,7 @@ def _find_layout(file: BinaryIO, path: Path) -> _Layout:
         raise ReadError(f"“{path.name}” holds no points.")
 
     sample = [line for line in lines[first : first + SAMPLE_LINES] if not is_comment(line)]
-    dialect = sniff_dialect(sample)
+    dialect = sniff_dialect(lines[first])
     values = dialect.split(lines[first])
     names = _names(header, dialect) if header is not None else ()
     if header is not None and len(names) != len(values):
@@ -119,9 +118,14 @@ def _find_layout(file: BinaryIO, path: Path) -> _Layout:
         else tuple(sorted(columns.values())),
         names,
         first,
-        sum(len(raw) for raw in raw_lines[:first]),
+        sum(map(len, raw_lines[:first])) if first else len(_mark(head)),
         announced,
     )
+
+
+def _mark(head: bytes) -> bytes:
+    """Return the mark by which some editors begin UTF-8 text."""
+    return codecs.BOM_UTF8 if head.startswith(codecs.BOM_UTF8) else b""
 
 
 def _names(header: str, dialect: Dialect) -> tuple[str, ...]:

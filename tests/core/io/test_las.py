@@ -16,9 +16,10 @@ WKT = 'COMPD_CS["ETRS89 / UTM 32N + DHHN2016",PROJCS["ETRS89 / UTM zone 32N",GEO
 
 def write_las(path: Path, points: Any, *, point_format: int = 7, colour_factor: int = 257) -> Path:
     """Write points by laspy alone."""
-    las = laspy.create(point_format=point_format, file_version="1.4")
-    las.header.scales = np.full(3, 1e-4)
-    las.header.offsets = np.floor(points.xyz.min(axis=0))
+    header = laspy.LasHeader(point_format=point_format, version="1.4")
+    header.scales = np.full(3, 1e-4)
+    header.offsets = np.floor(points.xyz.min(axis=0))
+    las = laspy.LasData(header)
     las.xyz = points.xyz
     las.intensity = points.intensity
     las.classification = points.intensity % 32
