@@ -60,6 +60,7 @@ def _measure(
     scale = {"mm": 1000.0, "m": 1.0, "%": 100.0, "°": 180 / math.pi}[unit]
     decimals = {"mm": 1, "m": 3, "%": 2, "°": 0}[unit]
     text = format_measure(scale * value_m, scale * sd_m, unit, decimals=decimals)
+    text = text.replace(" °", "°")
     return Property(label, text, cell(scale * value_m, 4), hint)
 
 

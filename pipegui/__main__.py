@@ -1,0 +1,7 @@
+"""``python -m pipegui``."""
+
+import sys
+
+from pipegui.app import main
+
+sys.exit(main())

@@ -1,0 +1,156 @@
+"""The long work of the window: reading, detecting, writing a report.
+
+Requests wait for one another. What a job makes is handed on as a signal; nothing here
+knows the document.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+
+from pipecore.errors import ReadError
+from pipecore.progress import Progress
+from pipecore.settings import Settings
+from pipecore.types import PointCloud, Result
+from pipegui.document import Scan
+from pipegui.worker import Cancelled, Event, Failed, Finished, Progressed, Started, Worker
+
+ReadFunction = Callable[[Path, Settings, Progress], PointCloud]
+DetectFunction = Callable[[PointCloud, Settings, Progress], Result]
+
+
+def read_file(path: Path, settings: Settings, progress: Progress) -> PointCloud:
+    """Read a scan with pipecore."""
+    from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
+
+    return read(path, length_unit=settings.input.length_unit, progress=progress)
+
+
+def detect_pipes(cloud: PointCloud, settings: Settings, progress: Progress) -> Result:
+    """Detect with pipecore."""
+    from pipecore.pipeline import detect  # noqa: PLC0415 - numba takes its time
+
+    return detect(cloud, settings, progress=progress)
+
+
+@dataclass(frozen=True)
+class _Request:
+    title: str
+    work: Callable[[Progress], Any]
+    done: Callable[[Any], None]
+
+
+class Jobs(QObject):
+    """Runs requests one after the other and tells what came of them."""
+
+    busy_changed = Signal(bool)
+    started = Signal(str)
+    progressed = Signal(object)
+    """A `Progressed` event."""
+    cancelling = Signal()
+    ended = Signal()
+    cancelled = Signal(str)
+    """Title of the job."""
+    failed = Signal(str, str)
+    """Message, and details for a bug report."""
+
+    scan_read = Signal(object)
+    """A `Scan`."""
+    detected = Signal(object, object)
+    """The cloud and its `Result`."""
+    written = Signal(object)
+    """Path of what was written."""
+
+    def __init__(
+        self,
+        read: ReadFunction = read_file,
+        detect: DetectFunction = detect_pipes,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._read, self._detect = read, detect
+        self._waiting: deque[_Request] = deque()
+        self._running: _Request | None = None
+        self.worker = Worker(self)
+        self.worker.event.connect(self._take)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something runs."""
+        return self._running is not None
+
+    def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
+        """Read each file as a scan of its own."""
+        for path in paths:
+
+            def work(progress: Progress, path: Path = path) -> Scan:
+                cloud = self._read(path, settings, progress)
+                if not len(cloud):
+                    raise ReadError(f"“{path.name}” holds no points.")
+                return Scan(path.name, cloud)
+
+            self._request(_Request(f"Reading {path.name}", work, self.scan_read.emit))
+
+    def detect(self, cloud: PointCloud, settings: Settings) -> None:
+        """Detect on a cloud."""
+
+        def work(progress: Progress) -> Result:
+            return self._detect(cloud, settings, progress)
+
+        self._request(_Request("Detecting", work, lambda r: self.detected.emit(cloud, r)))
+
+    def write(self, path: Path, write: Callable[[Progress], None]) -> None:
+        """Write something that takes its time."""
+        self._request(_Request("Exporting", write, lambda _: self.written.emit(path)))
+
+    def cancel(self) -> None:
+        """Stop what runs, and forget what waits."""
+        self._waiting.clear()
+        if self._running is not None:
+            self.cancelling.emit()
+            self.worker.cancel()
+
+    def close(self) -> None:
+        """Stop everything and wait for the worker's thread."""
+        self._waiting.clear()
+        self.worker.event.disconnect(self._take)
+        self.worker.close()
+
+    def _request(self, request: _Request) -> None:
+        self._waiting.append(request)
+        if self._running is None:
+            self._next()
+
+    def _next(self) -> None:
+        if self._waiting:
+            self._running = self._waiting.popleft()
+            self.worker.start(self._running.title, self._running.work)
+        self.busy_changed.emit(self.is_busy)
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Started():
+                self.started.emit(event.title)
+            case Progressed():
+                self.progressed.emit(event)
+            case Finished() | Failed() | Cancelled():
+                self._end(event)
+
+    def _end(self, event: Finished | Failed | Cancelled) -> None:
+        request, self._running = self._running, None
+        self.ended.emit()
+        if request is not None:
+            match event:
+                case Finished():
+                    request.done(event.value)
+                case Failed():
+                    self.failed.emit(event.message, event.details)
+                case Cancelled():
+                    self.cancelled.emit(request.title)
+        # What was done may have asked for more.
+        if self._running is None:
+            self._next()

@@ -1,0 +1,146 @@
+"""Where everything stands in the main window, as UI drawings have it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDockWidget, QTabWidget, QVBoxLayout, QWidget
+
+from pipegui.panels.deformation_table import DeformationTable
+from pipegui.panels.message_bar import MessageBar
+from pipegui.panels.project_tree import ProjectTree
+from pipegui.panels.properties import PropertiesPanel
+from pipegui.panels.settings_form import SettingsForm
+from pipegui.panels.stacks_panel import StacksPanel
+from pipegui.panels.welcome import Welcome
+
+if TYPE_CHECKING:
+    from pipegui.main_window import MainWindow
+
+LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
+RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
+BOTTOM = Qt.DockWidgetArea.BottomDockWidgetArea
+LAYOUT_VERSION = 1
+
+
+@dataclass
+class Panels:
+    """The panels around the 3D view."""
+
+    tree: ProjectTree
+    stacks: StacksPanel
+    settings: SettingsForm
+    properties: PropertiesPanel
+    table: DeformationTable
+    message: MessageBar
+    welcome: Welcome
+    docks: dict[str, QDockWidget]
+
+    @classmethod
+    def make(cls) -> "Panels":
+        """Make the panels, not yet placed."""
+        return cls(
+            ProjectTree(),
+            StacksPanel(),
+            SettingsForm(),
+            PropertiesPanel(),
+            DeformationTable(),
+            MessageBar(),
+            Welcome(),
+            {},
+        )
+
+    def open_stack_editor(self) -> None:
+        """Bring the stacks panel forward with its editor open."""
+        self.docks["Stacks"].show()
+        self.docks["Stacks"].raise_()
+        self.stacks.add()
+
+
+def arrange(window: "MainWindow") -> None:
+    """Place the panels and views in docks around the centre, as they were left last time."""
+    panels, parts = window.panels, window.parts
+    window.setDockOptions(
+        window.DockOption.AllowTabbedDocks
+        | window.DockOption.AllowNestedDocks
+        | window.DockOption.AnimatedDocks
+    )
+    window.setTabPosition(LEFT, QTabWidget.TabPosition.North)
+    window.setCorner(Qt.Corner.BottomLeftCorner, LEFT)
+    window.setCorner(Qt.Corner.BottomRightCorner, BOTTOM)
+
+    window.centre.addWidget(panels.welcome)
+    window.centre.addWidget(parts.scene)
+    centre = QWidget()
+    column = QVBoxLayout(centre)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(0)
+    column.addWidget(panels.message)
+    column.addWidget(window.centre, 1)
+    window.setCentralWidget(centre)
+
+    plots = QTabWidget()
+    plots.setObjectName("plots")
+    plots.setDocumentMode(True)
+    for title, widget in (
+        ("Radius", parts.radius_plot),
+        ("Map", parts.map),
+        ("Section", parts.section),
+    ):
+        plots.addTab(widget, title)
+
+    _dock(window, "Project", panels.tree, LEFT)
+    _dock(window, "Stacks", panels.stacks, LEFT)
+    _dock(window, "Settings", panels.settings, LEFT)
+    _dock(window, "Element", plots, RIGHT)
+    _dock(window, "Properties", panels.properties, RIGHT)
+    _dock(window, "Deformations", panels.table, BOTTOM)
+    docks = panels.docks
+    window.tabifyDockWidget(docks["Stacks"], docks["Settings"])
+    docks["Stacks"].raise_()
+
+    window.actions_.menus["View"].addMenu(_panel_menu(window))
+    _restore(window)
+
+
+def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
+    dock = QDockWidget(title, window)
+    dock.setObjectName(title)
+    dock.setWidget(widget)
+    window.panels.docks[title] = dock
+    window.addDockWidget(area, dock)
+
+
+def _panel_menu(window: "MainWindow"):
+    menu = window.menuBar().addMenu("Panels")
+    window.menuBar().removeAction(menu.menuAction())
+    for dock in window.panels.docks.values():
+        menu.addAction(dock.toggleViewAction())
+    return menu
+
+
+def _restore(window: "MainWindow") -> None:
+    geometry, state = (window.stored.value(f"window/{name}") for name in ("geometry", "state"))
+    if geometry is None or not window.restoreGeometry(geometry):
+        available = window.screen().availableGeometry()
+        window.resize(min(1600, available.width()), min(1000, available.height()))
+    if state is not None and window.restoreState(state, LAYOUT_VERSION):
+        return
+    width, height = window.width(), window.height()
+    docks = window.panels.docks
+    window.resizeDocks(
+        [docks["Project"], docks["Element"]],
+        [max(260, width * 17 // 100), max(340, width * 26 // 100)],
+        Qt.Orientation.Horizontal,
+    )
+    window.resizeDocks([docks["Deformations"]], [max(200, height // 4)], Qt.Orientation.Vertical)
+    window.resizeDocks(
+        [docks["Project"], docks["Stacks"]],
+        [height * 55 // 100, height * 45 // 100],
+        Qt.Orientation.Vertical,
+    )
+    window.resizeDocks(
+        [docks["Element"], docks["Properties"]],
+        [height * 45 // 100, height * 35 // 100],
+        Qt.Orientation.Vertical,
+    )

@@ -1,0 +1,163 @@
+"""What menu entries do that ask for a file or show a dialog."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLabel, QMenu, QMessageBox
+
+import pipecore
+from pipecore.errors import PipecoreError
+from pipecore.progress import Progress
+from pipecore.resources import resource
+from pipecore.settings import Settings
+from pipegui import commands, files
+from pipegui.actions import SPECS
+
+if TYPE_CHECKING:
+    from pipegui.main_window import MainWindow
+
+CSV = "Tables (*.csv)"
+
+
+class MenuActions:
+    """The part of the window's actions that talks to the file system and the user."""
+
+    def __init__(self, window: "MainWindow") -> None:
+        self._window = window
+        self._recent_menu: QMenu | None = None
+
+    # Opening
+
+    def open(self) -> None:
+        """Ask for scans and open them."""
+        self._window.open_files(files.ask_scans(self._window, self._window.stored))
+
+    def open_demo(self) -> None:
+        """Open the scan that comes with the program."""
+        self._window.open_files([resource("demo", "demo.laz")])
+
+    def list_recent(self) -> None:
+        """Bring the menu of recent files up to date."""
+        window = self._window
+        if self._recent_menu is None:
+            self._recent_menu = QMenu("Open recent", window)
+            file_menu = window.actions_.menus["File"]
+            file_menu.insertMenu(window.actions_["close_scan"], self._recent_menu)
+        self._recent_menu.clear()
+        paths = files.recent(window.stored)
+        self._recent_menu.setEnabled(bool(paths))
+        for path in paths:
+            action = self._recent_menu.addAction(path.name)
+            action.setToolTip(str(path))
+            action.triggered.connect(lambda _=False, path=path: window.open_files([path]))
+        self._recent_menu.setToolTipsVisible(True)
+
+    # Settings
+
+    def load_settings(self) -> None:
+        """Ask for a settings file and take it."""
+        window = self._window
+        path = files.ask_settings(window, window.stored)
+        if path is None:
+            return
+        try:
+            window.do(commands.load_settings, Settings.from_toml(path))
+        except PipecoreError as error:
+            window.panels.message.tell(str(error), "error")
+
+    def save_settings(self) -> None:
+        """Ask where to, and keep the settings as a file."""
+
+        def write(path: Path) -> None:
+            with pipecore.io.write_file(path) as temporary:
+                temporary.write_text(self._window.document.settings.to_toml(), encoding="utf-8")
+
+        self._save("Save settings", "settings.toml", "Settings (*.toml)", write)
+
+    # Exporting
+
+    def export_table(self, table: str) -> None:
+        """Ask where to, and write a table: "deformations", "elements" or "profiles"."""
+        from pipecore import report  # noqa: PLC0415
+
+        result = self._window.document.result
+        if result is not None:
+            write = getattr(report, f"write_{table}_csv")
+            name = f"{self._stem()} {table}.csv"
+            self._save(f"Export {table}", name, CSV, lambda path: write(path, result))
+
+    def export_picture(self) -> None:
+        """Ask where to, and save what the 3D view shows."""
+
+        def write(path: Path) -> None:
+            self._window.parts.scene.screenshot(path)
+
+        self._save("Save picture", f"{self._stem()}.png", "Pictures (*.png)", write)
+
+    def export_report(self) -> None:
+        """Ask where to, and write the whole report in the background."""
+        from pipecore import report  # noqa: PLC0415
+
+        window, scan = self._window, self._window.document.scan
+        if scan is None or scan.result is None:
+            return
+        folder = files.ask_report_folder(window, window.stored, f"{self._stem()} report")
+        if folder is None:
+            return
+        cloud, result = scan.cloud, scan.result
+
+        def write(progress: Progress) -> None:
+            report.write_report(folder, cloud, result, progress=progress)
+
+        window.jobs.write(folder, write)
+
+    def _stem(self) -> str:
+        scan = self._window.document.scan
+        return Path(scan.name).stem if scan else "pipes"
+
+    def _save(self, title: str, name: str, name_filter: str, write: Callable[[Path], None]) -> None:
+        window = self._window
+        path = files.ask_target(window, window.stored, title, name, name_filter)
+        if path is None:
+            return
+        try:
+            write(path)
+        except (PipecoreError, OSError) as error:
+            window.panels.message.tell(f"“{path}” was not saved: {error}", "error")
+        else:
+            window.panels.message.tell(f"Saved “{path}”.")
+
+    # Help
+
+    def show_shortcuts(self) -> None:
+        """List the keys of all actions."""
+        dialog = QDialog(self._window)
+        dialog.setObjectName("shortcuts")
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowTitle("Keyboard shortcuts")
+        form = QFormLayout(dialog)
+        form.setHorizontalSpacing(32)
+        for spec in SPECS:
+            if spec.shortcut:
+                key = self._window.actions_[spec.name].shortcut().toString()
+                form.addRow(key, QLabel(spec.text.rstrip("…")))
+        form.addRow("← →", QLabel("Previous and next profile, in the section"))
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        buttons.rejected.connect(dialog.close)
+        form.addRow(buttons)
+        dialog.show()
+
+    def show_about(self) -> None:
+        """Say which version this is."""
+        box = QMessageBox(self._window)
+        box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        box.setWindowTitle("About PipeGUI")
+        box.setText(f"PipeGUI {pipecore.__version__}")
+        box.setInformativeText(
+            "Finds pipes in laser scans, measures them, and shows where they are deformed.\n\n"
+            "After Mapurisa and Sithole, “Deformation detection in piping installations using "
+            "profiling techniques”."
+        )
+        box.open()

@@ -1,0 +1,84 @@
+"""A line above the 3D view that says what happened, without being in the way."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import (
+    QDialog,
+    QDialogButtonBox,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPlainTextEdit,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from pipegui import theme
+
+_ICONS = {
+    "info": ("check-circle-outline", "accent"),
+    "warning": ("alert", "#e69f00"),
+    "error": ("alert-circle-outline", "#d55e00"),
+}
+
+
+class MessageBar(QFrame):
+    """Shows one message at a time; an error's details can be looked at and copied."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setObjectName("message")
+        self._details = ""
+        self._icon = QLabel()
+        self.text = QLabel()
+        self.text.setWordWrap(True)
+        self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.details_button = QToolButton()
+        self.details_button.setText("Details…")
+        self.details_button.clicked.connect(self._show_details)
+        self.close_button = QToolButton()
+        self.close_button.setAccessibleName("Close the message")
+        self.close_button.clicked.connect(self.hide)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, theme.SPACING // 2, theme.SPACING // 2, theme.SPACING // 2)
+        row.setSpacing(theme.SPACING)
+        row.addWidget(self._icon)
+        row.addWidget(self.text, 1)
+        row.addWidget(self.details_button)
+        row.addWidget(self.close_button)
+        self.hide()
+
+    def tell(self, text: str, severity: str = "info", details: str = "") -> None:
+        """Show a message; `severity` is "info", "warning" or "error"."""
+        self._details = details
+        self.text.setText(text)
+        icon, tint = _ICONS[severity]
+        self._icon.setPixmap(theme.icon(icon, tint).pixmap(theme.icon_size()))
+        self.close_button.setIcon(theme.icon("close", "muted"))
+        self.details_button.setVisible(bool(details))
+        self.setProperty("severity", severity)
+        self.style().unpolish(self)
+        self.style().polish(self)
+        self.show()
+
+    def _show_details(self) -> None:
+        dialog = QDialog(self.window())
+        dialog.setObjectName("details")
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.setWindowTitle("Details")
+        dialog.resize(80 * theme.SPACING, 48 * theme.SPACING)
+        message = QLabel(self.text.text())
+        message.setWordWrap(True)
+        details = QPlainTextEdit(self._details)
+        details.setReadOnly(True)
+        details.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
+        copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        whole = f"{self.text.text()}\n\n{self._details}"
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(whole))
+        buttons.rejected.connect(dialog.close)
+        column = QVBoxLayout(dialog)
+        for widget in (message, details, buttons):
+            column.addWidget(widget)
+        dialog.show()

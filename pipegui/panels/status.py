@@ -1,0 +1,89 @@
+"""The status bar: what is looked at, where the cursor is, how far the work is."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QStatusBar, QToolButton, QWidget
+
+from pipegui import describe, theme
+from pipegui.view_state import WindowState
+from pipegui.worker import Progressed
+
+UNTIMED = 1000
+"""Steps of the progress bar."""
+
+
+class StatusBar(QStatusBar):
+    """Points and coordinates on the left, the running job on the right."""
+
+    cancel_requested = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._title = ""
+        self.scan = QLabel()
+        self.cursor_position = QLabel()
+        self.cursor_position.setAccessibleName("Coordinates under the cursor")
+        self.job = QLabel()
+        self.bar = QProgressBar()
+        self.bar.setTextVisible(False)
+        self.bar.setFixedWidth(16 * theme.SPACING)
+        self.cancel = QToolButton()
+        self.cancel.setText("Cancel")
+        self.cancel.setAutoRaise(True)
+        self.cancel.clicked.connect(self.cancel_requested)
+        self._job_box = QWidget()
+        row = QHBoxLayout(self._job_box)
+        row.setContentsMargins(0, 0, theme.SPACING, 0)
+        row.setSpacing(theme.SPACING)
+        for widget in (self.job, self.bar, self.cancel):
+            row.addWidget(widget)
+        self.addWidget(self.scan)
+        self.addWidget(self.cursor_position)
+        self.addPermanentWidget(self._job_box)
+        self._job_box.hide()
+
+    def apply(self, state: WindowState) -> None:
+        """Show which scan is looked at."""
+        if state.scan is None:
+            self.scan.setText("No scan open")
+            self.cursor_position.clear()
+            return
+        cloud = state.scan.cloud
+        parts = [describe.point_count(len(cloud)), *([cloud.crs] if cloud.crs else [])]
+        self.scan.setText(" · ".join(parts))
+
+    def start(self, title: str) -> None:
+        """Show that a job has begun."""
+        self._title = title
+        self.job.setText(f"{title}…")
+        self.bar.setRange(0, 0)
+        self.cancel.setEnabled(True)
+        self._job_box.show()
+
+    def progress(self, event: Progressed) -> None:
+        """Show how far a job is."""
+        if not event.stage or not self.cancel.isEnabled():
+            return
+        self.bar.setRange(0, UNTIMED)
+        self.bar.setValue(round(UNTIMED * event.fraction))
+        parts = [f"{self._title}: {event.stage} {100 * event.fraction:.0f} %"]
+        if event.seconds_left is not None:
+            parts.append(_time_left(event.seconds_left))
+        self.job.setText(" · ".join(parts))
+
+    def show_cancelling(self) -> None:
+        """Answer a cancel at once, before the work has stopped."""
+        if self._job_box.isVisible():
+            self.cancel.setEnabled(False)
+            self.job.setText("Cancelling…")
+
+    def end(self) -> None:
+        """Show that nothing runs any more."""
+        self._job_box.hide()
+
+
+def _time_left(seconds: float) -> str:
+    if seconds < 1:
+        return "almost done"
+    if seconds < 90:
+        return f"{seconds:.0f} s left"
+    return f"{seconds / 60:.0f} min left"

@@ -1,0 +1,28 @@
+"""The views that come from elsewhere: 3D scene and plots, made when the window is."""
+
+from dataclasses import dataclass
+
+from PySide6.QtWidgets import QWidget
+
+
+@dataclass
+class Parts:
+    """The views of a window that draw points and curves.
+
+    Each has `apply(state)` for its state in `pipegui.view_state`.
+    """
+
+    scene: QWidget
+    radius_plot: QWidget
+    section: QWidget
+    map: QWidget
+
+
+def make_parts() -> Parts:
+    """Make the real views. Imported here, because VTK takes its time."""
+    from pipegui.plots.deviation_map import DeviationMap  # noqa: PLC0415
+    from pipegui.plots.radius_plot import RadiusPlot  # noqa: PLC0415
+    from pipegui.plots.section_view import SectionView  # noqa: PLC0415
+    from pipegui.scene.view import SceneView  # noqa: PLC0415
+
+    return Parts(SceneView(), RadiusPlot(), SectionView(), DeviationMap())

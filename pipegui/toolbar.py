@@ -1,0 +1,80 @@
+"""The tool bar: open, detect, cancel, undo, views, and what the colours mean."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QLabel, QToolBar, QToolButton, QWidget
+
+from pipegui import theme
+from pipegui.actions import Actions
+from pipegui.commands import colours_of
+from pipegui.document import ColourBy
+from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+from pipegui.view_state import WindowState
+
+
+class ToolBar(QToolBar):
+    """Buttons of the actions used most, and the choice of colours."""
+
+    colour_chosen = Signal(object)
+    limit_chosen = Signal(float)
+
+    def __init__(self, actions: Actions, parent: QWidget | None = None) -> None:
+        super().__init__("Tools", parent)
+        self.setObjectName("tools")
+        self.setMovable(False)
+        self.setIconSize(theme.icon_size(2.5))
+        self._applying = Applying()
+        for name in ("open", "detect", "cancel"):
+            self.addAction(actions[name])
+            button = self.widgetForAction(actions[name])
+            if isinstance(button, QToolButton):
+                button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+        self.widgetForAction(actions["detect"]).setObjectName("primary")
+        self.addSeparator()
+        for name in ("undo", "redo"):
+            self.addAction(actions[name])
+        self.addSeparator()
+        for name in ("fit", "view_top", "view_front", "view_right", "view_iso"):
+            self.addAction(actions[name])
+        self.addSeparator()
+        self.colour = QuietComboBox()
+        self.colour.setAccessibleName("Colour by")
+        self.colour.setToolTip("What the colour of the points means")
+        self.colour.setSizeAdjustPolicy(QuietComboBox.SizeAdjustPolicy.AdjustToContents)
+        self.colour.currentIndexChanged.connect(self._tell_colour)
+        self.limit = QuietSpinBox()
+        self.limit.setAccessibleName("Deviation limits")
+        self.limit.setToolTip("Deviations from − to + this are told apart by colour")
+        self.limit.setRange(0.5, 500)
+        self.limit.setPrefix("± ")
+        self.limit.setSuffix(" mm")
+        self.limit.valueChanged.connect(self._tell_limit)
+        self.addWidget(QLabel("Colour by"))
+        self.addWidget(self.colour)
+        self._limit_label = self.addWidget(QLabel("Limits"))
+        self._limit_action = self.addWidget(self.limit)
+        self.addSeparator()
+        for name in ("previous_deformation", "next_deformation"):
+            self.addAction(actions[name])
+
+    def apply(self, state: WindowState) -> None:
+        """Show a state."""
+        with self._applying:
+            self.colour.setEnabled(state.scan is not None)
+            offered = colours_of(state.scan) if state.scan else (ColourBy.HEIGHT,)
+            if tuple(self.colour.itemData(i) for i in range(self.colour.count())) != offered:
+                self.colour.clear()
+                for colour in offered:
+                    self.colour.addItem(str(colour), colour)
+            self.colour.setCurrentIndex(self.colour.findData(state.view.colour_by))
+            self.limit.setValue(state.view.deviation_limit_mm)
+        shows_deviation = state.scan is not None and state.view.colour_by is ColourBy.DEVIATION
+        for action in (self._limit_label, self._limit_action):
+            action.setVisible(shows_deviation)
+
+    def _tell_colour(self) -> None:
+        if not self._applying:
+            self.colour_chosen.emit(self.colour.currentData())
+
+    def _tell_limit(self, limit: float) -> None:
+        if not self._applying:
+            self.limit_chosen.emit(limit)

@@ -1,0 +1,66 @@
+"""Stand-ins for the views that draw, for tests of the window around them: fast, without GL.
+
+They keep the states they were given and have the real views' signals.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QWidget
+
+from pipegui.parts import Parts
+
+
+class FakeView(QWidget):
+    def __init__(self) -> None:
+        super().__init__()
+        self.states: list[Any] = []
+
+    def apply(self, state: Any) -> None:
+        self.states.append(state)
+
+    @property
+    def state(self) -> Any:
+        return self.states[-1]
+
+
+class FakeScene(FakeView):
+    picked = Signal(int)
+    hovered = Signal(int)
+    deformation_picked = Signal(int)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.standard_views: list[str] = []
+
+    def set_standard_view(self, name: str) -> None:
+        self.standard_views.append(name)
+
+    def fit(self) -> None:
+        self.standard_views.append("fit")
+
+    def view_direction(self) -> np.ndarray:
+        return np.array([0.0, 0.6, -0.8])
+
+    def screenshot(self, path: Path) -> None:
+        self.grab().save(str(path))
+
+
+class FakeRadiusPlot(FakeView):
+    profile_clicked = Signal(int, int)
+    stack_chosen = Signal(int)
+
+
+class FakeSection(FakeView):
+    step_requested = Signal(int)
+
+
+class FakeMap(FakeView):
+    spot_clicked = Signal(float, float)
+    deformation_clicked = Signal(int)
+
+
+def make_fake_parts() -> Parts:
+    return Parts(FakeScene(), FakeRadiusPlot(), FakeSection(), FakeMap())
