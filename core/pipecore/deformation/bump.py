@@ -61,6 +61,7 @@ def fit_bump(
     diameter: float,
     contour_sd: float,
     inflation: float,
+    is_final: bool = True,
 ) -> Bump | None:
     """Fit a bump to points (n,) in the plane; None if they do not carry one.
 
@@ -75,10 +76,12 @@ def fit_bump(
     diameter, contour_sd : float
     inflation : float
         How much larger the noise of means is than that of points alone would make it.
+    is_final : bool
+        Whether all forms are tried; else only the plain one, which suffices for a mask.
     """
     height, length, width = start
     fits: list[_Fit] = []
-    for _ in range(2):  # the second time with a window that suits the extents found
+    for is_first in (True, False):  # the second time with a window that suits the extents found
         near = (np.abs(along) < 0.8 * length) & (np.abs(around) < 0.8 * width)
         if np.count_nonzero(near) < 8:
             return None
@@ -86,11 +89,20 @@ def fit_bump(
         first = np.array([height, 0.0, 0.0, np.log(length), np.log(width), 0.0])
         if fits:
             first = min(fits, key=lambda f: f.aic).parameters[:6]
-        shapes = [(False, False), (True, False)]
-        if abs(height) / max(_height_sd(data, length, width), 1e-9) > CLEAR:
+        shapes = [(True, False)]
+        if is_final and not is_first:
+            shapes.append((False, False))
+        if len(shapes) > 1 and abs(height) / max(_height_sd(data, length, width), 1e-9) > CLEAR:
             shapes += [(False, True), (True, True)]
         fits = [
-            _fit(data, first, is_ellipse, free_shape, diameter, contour_sd)
+            _fit(
+                data,
+                first,
+                is_ellipse=is_ellipse,
+                free_shape=free_shape,
+                diameter=diameter,
+                contour_sd=contour_sd,
+            )
             for is_ellipse, free_shape in shapes
         ]
         best = min(fits, key=lambda f: f.aic)
@@ -142,6 +154,7 @@ def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:
 def _fit(
     data: tuple[Array, ...],
     first: Array,
+    *,
     is_ellipse: bool,
     free_shape: bool,
     diameter: float,
@@ -173,7 +186,14 @@ def _fit(
 
     scale = np.array([1e-3, 0.1 * extent[0], 0.1 * extent[1], 0.1, 0.1, 1e-3, 0.2])[: len(start)]
     answer = least_squares(
-        residuals, start, bounds=(low, high), x_scale=scale, diff_step=1e-5, max_nfev=60
+        residuals,
+        start,
+        bounds=(low, high),
+        x_scale=scale,
+        diff_step=1e-5,
+        max_nfev=40,
+        ftol=1e-5,
+        xtol=1e-5,
     )
     information = answer.jac.T @ answer.jac
     # An extent at its bound has no slope; a trace of prior keeps the inverse finite.

@@ -86,7 +86,8 @@ def find_deformations(
     patches, contour = find_patches(element, surface, heights, n_terms, settings.significance)
 
     deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
-    deformations = [d for d in deformations if d.depth >= settings.min_depth_mm / 1000]
+    least = settings.min_depth_mm / 1000
+    deformations = [d for d in deformations if d.depth >= max(least, 3 * d.depth_sd)]
     ovality = ovality_sd = np.nan
     if n_terms == 5:
         ovality, ovality_sd = mean_ovality(contour)

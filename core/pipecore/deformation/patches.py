@@ -51,11 +51,16 @@ def find_patches(
     patches: list[Patch] = []
     for turn in range(N_ROUNDS):
         threshold = significance if turn == N_ROUNDS - 1 else 0.75 * significance
+        is_final = turn == N_ROUNDS - 1
         candidates = _candidates(cells, contour, 0.75 * significance)
-        measured = [_measure(element, surface, cells, contour, c) for c in candidates]
+        masked = np.zeros(grid.shape, dtype=bool)
+        measured = []
+        for seen in candidates:
+            masked |= disc(grid, seen.chainage, seen.clock, MASK * seen.length, MASK * seen.width)
+            if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 2:
+                measured.append(_measure(element, surface, cells, contour, seen, is_final))
         patches = _without_overlap([p for p in measured if p is not None and abs(p.z) >= threshold])
-        if turn < N_ROUNDS - 1:
-            masked = np.zeros(grid.shape, dtype=bool)
+        if not is_final:
             for patch in patches:
                 masked |= patch.cells(grid, MASK)
             outside = np.where(masked, np.inf, variance)
@@ -74,7 +79,12 @@ def _candidates(cells: DeviationMap, contour: Contour, threshold: float) -> list
 
 
 def _measure(
-    element: Element, surface: Surface, cells: DeviationMap, contour: Contour, seen: Candidate
+    element: Element,
+    surface: Surface,
+    cells: DeviationMap,
+    contour: Contour,
+    seen: Candidate,
+    is_final: bool,
 ) -> Patch | None:
     grid, points = surface.grid, surface.points
     reach = 2.5 * max(seen.length, seen.width)
@@ -99,6 +109,7 @@ def _measure(
         diameter=2 * radius,
         contour_sd=contour_sd,
         inflation=seen.inflation,
+        is_final=is_final,
     )
     if bump is None:
         return None
@@ -111,51 +122,54 @@ def _measure(
 
 
 def _known_shape_sd(cells: DeviationMap, chainage: float, clock: float, bump: Bump) -> float:
-    u, v = _shares(cells.grid, chainage, clock, bump)
+    u, v = _shares(cells.grid, chainage, clock, bump.length, bump.width)
     bell = np.cos(np.pi / 2 * np.minimum(np.hypot(u, v), 1.0)) ** 2
     precision = np.sum(bell**2 * cells.count / cells.noise**2)
     return float(1.0 / np.sqrt(max(precision, 1e-12)))
 
 
-def _shares(grid: Grid, chainage: float, clock: float, bump: Bump) -> tuple[Array, Array]:
+def _shares(
+    grid: Grid, chainage: float, clock: float, length: float, width: float
+) -> tuple[Array, Array]:
+    """Distances of all cells from a place as shares of half the extents."""
     turn = np.mod(grid.clocks - clock + np.pi, 2 * np.pi) - np.pi
-    u = (grid.chainages - chainage) / (bump.length / 2)
-    v = turn * grid.radius / (bump.width / 2)
-    return u[:, None] + 0 * v, v[None, :] + 0 * u[:, None]
+    u = (grid.chainages - chainage) / (length / 2)
+    v = turn * grid.radius / (width / 2)
+    return np.broadcast_arrays(u[:, None], v[None, :])
+
+
+def _closed_sides(
+    cells: DeviationMap, chainage: float, clock: float, length: float, width: float
+) -> int:
+    """On how many of its four sides a bump is seen to come back to the contour."""
+    grid = cells.grid
+    u, v = _shares(grid, chainage, clock, length, width)
+    distance = np.hypot(u, v)
+    covered = cells.covered & (distance > 0.4) & (distance < 1.2)
+    # Beyond the ends there are no cells: count what should be there.
+    quarter = np.pi / 4 * (1.2**2 - 0.4**2) * (length * width / 4)
+    expected = quarter / (grid.row_size * grid.column_size)
+    sides = [u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)]
+    return sum(int(np.count_nonzero(covered & side) > 0.5 * expected) for side in sides)
 
 
 def _is_enclosed(cells: DeviationMap, chainage: float, clock: float, bump: Bump) -> bool:
-    """Whether a bump is seen at its peak and has come back to the contour around it.
+    """Whether a bump is seen at its peak and all around it.
 
     A dent may be cut off on one side by the edge of what was scanned. A bulge may not,
     nor have another surface near: things that touch a pipe look like that.
     """
-    grid = cells.grid
-    if not 0 < chainage < grid.length:
+    if not 0 < chainage < cells.grid.length:
         return False
-    u, v = _shares(grid, chainage, clock, bump)
-    distance = np.hypot(u, v)
-    sides = [
-        (u > np.abs(v)),
-        (u < -np.abs(v)),
-        (v > np.abs(u)),
-        (v < -np.abs(u)),
-    ]
-    covered = cells.covered
-    # A bump that ends with the element has no cells beyond it: count what should be there.
-    n_closed = 0
-    expected = bump.length * bump.width / (grid.row_size * grid.column_size) / 4
-    expected *= np.pi / 4 * (1.2**2 - 0.4**2)
-    for side in sides:
-        ring = side & (distance > 0.4) & (distance < 1.2)
-        n_closed += np.count_nonzero(covered & ring) > 0.5 * expected
-    centre = distance < 0.5
-    seen = np.count_nonzero(covered & centre) > 0.6 * np.count_nonzero(centre)
+    n_closed = _closed_sides(cells, chainage, clock, bump.length, bump.width)
+    distance = np.hypot(*_shares(cells.grid, chainage, clock, bump.length, bump.width))
+    centre, inside = distance < 0.5, distance < 1.1
+    if np.count_nonzero(cells.covered & centre) <= 0.6 * np.count_nonzero(centre):
+        return False
     if bump.height < 0:
-        return bool(seen and n_closed >= 3)
-    inside = distance < 1.1
-    disputed = np.count_nonzero(dilate(cells.disputed) & inside) / max(np.count_nonzero(inside), 1)
-    return bool(seen and n_closed == 4 and disputed < 0.1 and bump.misfit < 2.5)
+        return n_closed >= 3
+    disputed = np.count_nonzero(dilate(cells.disputed) & inside)
+    return n_closed == 4 and disputed < 0.1 * np.count_nonzero(inside) and bump.misfit < 2.5
 
 
 def _without_overlap(patches: list[Patch]) -> list[Patch]:

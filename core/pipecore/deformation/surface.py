@@ -86,7 +86,7 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     tolerance = 4 * noise + slope.ravel()[cell]
     belongs = facing & reached & (np.abs(level - local) < tolerance)
     # A stray point makes a cell of its own: the surface has company.
-    company = box_sum(grid.count(cell[belongs]))
+    company = box_sum(grid.count(cell[belongs]), 2)
     belongs &= company.ravel()[cell] >= 3
 
     above = near & ~belongs & (level > 4 * noise) & (level > local + tolerance)

@@ -1,4 +1,4 @@
-"""An element's neighbourhood rolled out flat: chainage, clock and signed distance from the surface."""
+"""An element's neighbourhood rolled out flat: chainage, clock and height above its surface."""
 
 from dataclasses import dataclass
 
