@@ -98,7 +98,9 @@ def _add_simulate(commands: Any) -> None:
     parser.add_argument(
         "-o", "--output", required=True, type=Path, metavar="FILE.laz", help="the scan"
     )
-    parser.add_argument("--seed", type=int, metavar="N", help="seed of the scan's random errors")
+    parser.add_argument(
+        "--seed", type=_natural, metavar="N", help="seed of the scan's errors, for another scan"
+    )
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
 
 
@@ -153,6 +155,13 @@ def _help(spec: FieldSpec) -> str:
         notes.append(f"default {spec.default}")
     text = f"{spec.help} ({'; '.join(notes)})" if notes else spec.help
     return text.replace("%", "%%")
+
+
+def _natural(text: str) -> int:
+    number = int(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError("must not be negative")
+    return number
 
 
 def _count(text: str) -> int:

@@ -1,6 +1,7 @@
 """``pipecore simulate``."""
 
 import argparse
+from dataclasses import replace
 
 from pipecore import io
 from pipecore.cli.console import Console
@@ -13,7 +14,10 @@ def run(args: argparse.Namespace, console: Console) -> None:
     """Scan a scene and write the cloud, with its truth beside it."""
     if args.output.suffix.lower() != ".laz":
         raise WriteError(f"The scan is written as LAZ: “{args.output}” must end with .laz.")
-    simulated = scan(find_scene(args.scene, args.seed), progress=console)
+    scene = find_scene(args.scene)
+    if args.seed is not None:
+        scene = replace(scene, seed=args.seed)
+    simulated = scan(scene, progress=console)
     truth_path = args.output.with_name("truth.json")
     with io.write_file(truth_path) as temporary:
         simulated.write_truth(temporary)

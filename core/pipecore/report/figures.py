@@ -43,6 +43,9 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "pipecore",
 }
+RIGHT = (0.57, 0.19, 0.35, 0.70)
+COLOUR_BAR = (0.93, 0.19, 0.012, 0.70)
+
 FINEST_CELLS_AROUND = 60
 POINTS_PER_CELL = 6
 SECTION_CELLS = 72
@@ -52,8 +55,9 @@ def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result
     """Return the figure of one deformation as an ``<svg>`` element."""
     element = result.element(deformation.element_id)
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(7.4, 2.3), layout="constrained")
-        left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+        # Places by hand: a layout engine takes as long as all the drawing.
+        figure = Figure(figsize=(7.4, 2.3))
+        left, right = figure.add_axes((0.06, 0.19, 0.44, 0.70)), figure.add_axes(RIGHT)
         left.patch.set_visible(False)
         _draw_radius(left, deformation, element, result)
         if deformation.kind in (DeformationKind.DENT, DeformationKind.BULGE):
@@ -98,6 +102,11 @@ def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result:
     axes.margins(y=0.25)
 
 
+def _drawn_depth(deformation: Deformation) -> float:
+    """Depth that a drawing is scaled to, metres: some centimetre where it is not known."""
+    return max(deformation.depth, 0.001) if np.isfinite(deformation.depth) else 0.01
+
+
 def _points_of(element: Element, cloud: PointCloud, result: Result) -> tuple[Array, Array, Array]:
     """Chainage, clock and deviation of an element's points."""
     rows = np.flatnonzero(result.element_id == element.element_id)
@@ -113,7 +122,8 @@ def _draw_map(
     low = max(0.0, deformation.chainage - reach)
     high = min(element.axis.length, deformation.chainage + reach)
     # The deformation stands in the middle of the map, wherever it is on the clock.
-    around = np.mod(clock - deformation.clock + np.pi, 2 * np.pi) - np.pi
+    middle = deformation.clock if np.isfinite(deformation.clock) else np.pi
+    around = np.mod(clock - middle + np.pi, 2 * np.pi) - np.pi
     valid = np.isfinite(deviation) & (chainage >= low) & (chainage <= high)
     n_around = _cells_around(int(valid.sum()), high - low, element)
     cell = 2 * np.pi * element.radius / n_around
@@ -125,8 +135,7 @@ def _draw_map(
     total = np.histogram2d(chainage[valid], around[valid], weights=deviation[valid], **where)[0]
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
-    depth = deformation.depth if np.isfinite(deformation.depth) else 0.01
-    limit = float(np.ceil(1000 * depth))
+    limit = float(np.ceil(1000 * _drawn_depth(deformation)))
     axes.set_facecolor("#eeeeee")  # holes stay holes
     image = axes.imshow(
         1000 * mean.T,
@@ -139,8 +148,9 @@ def _draw_map(
     )
     axes.plot(deformation.chainage, 0, "+", color="black", ms=7, mew=1.0)
     axes.set(xlabel="chainage (m)", title="deviation (mm), unrolled; blue inward, red outward")
-    _set_clock_ticks(axes, deformation.clock)
-    axes.figure.colorbar(image, ax=axes, ticks=[-limit, 0, limit], pad=0.02, aspect=12)
+    _set_clock_ticks(axes, middle)
+    figure = axes.figure
+    figure.colorbar(image, cax=figure.add_axes(COLOUR_BAR), ticks=[-limit, 0, limit])
 
 
 def _cells_around(n_points: int, length: float, element: Element) -> int:
@@ -165,7 +175,7 @@ def _draw_section(
     angle, mean = _means_around(clock[near], deviation[near])
     radius = float(element.radius_at(deformation.chainage))
     # So exaggerated that the deviation is a fifth of the radius, by a round factor.
-    exaggeration = max(1, round(radius / 5 / max(deformation.depth, 1e-3)))
+    exaggeration = max(1, round(radius / 5 / _drawn_depth(deformation)))
     circle = np.linspace(0, 2 * np.pi, 181)
 
     def draw(at: Array, departure: Array | float, *style: str, **look: Any) -> None:

@@ -218,15 +218,24 @@ def _figures(
         figures.append(
             {
                 "title": f"{d.kind.capitalize()} {d.deformation_id} on {element.label}",
-                "text": f"{format_measure(1000 * d.depth, 1000 * d.depth_sd, 'mm')} at "
-                f"chainage {d.chainage:.2f} m, {format_clock(d.clock)} o’clock, "
-                f"{place.spoken(d.peak)}",
+                "text": " · ".join(_where(d, place)),
                 "verdict": d.verdict,
                 "svg": Markup(draw_deformation(d, cloud, result)),
             }
         )
     progress.update("drawing figures", 1.0)
     return figures
+
+
+def _where(d: Deformation, place: FileCoordinates) -> list[str]:
+    """What stands beside a figure's title: how deep, and where."""
+    parts = [
+        format_measure(1000 * d.depth, 1000 * d.depth_sd, "mm"),
+        f"chainage {d.chainage:.2f} m",
+    ]
+    if np.isfinite(d.clock):
+        parts.append(f"{format_clock(d.clock)} o’clock")
+    return [*parts, place.spoken(d.peak)]
 
 
 def _blind_spot(result: Result, rule: Rule) -> str:
