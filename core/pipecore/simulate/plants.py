@@ -146,6 +146,8 @@ class _Planner:
     """By run: whether nothing supports or nearly touches it."""
     supports: list[float] = field(default_factory=list)
     """Heights of the rack's levels."""
+    wall_y: float = -2.0
+    """Face of the wall behind the rack, or as far as stations may stand without one."""
 
     def _size(self, largest_dn: int = 400, smallest_dn: int = 40) -> PipeSize:
         fitting = [s for s in SIZES if smallest_dn <= s.dn <= largest_dn]
@@ -350,12 +352,12 @@ class _Planner:
         low_y = min(float((b.centres[:, 1] - b.radii).min()) for b in self.room.bodies)
         length, middle = RACK_LENGTH + 3.0, RACK_LENGTH / 2
         self.clutter.append(Box((middle, 2.2, -0.05), (length, 9.0, 0.1)))
-        wall_y = low_y - float(self.rng.choice([NEAR, 0.05, 0.3]))
+        self.wall_y = low_y - float(self.rng.choice([NEAR, 0.05, 0.3]))
         self.clutter.append(
-            Box((middle, wall_y - 0.05, 1.7), (length, 0.1, 3.4), material="plaster")
+            Box((middle, self.wall_y - 0.05, 1.7), (length, 0.1, 3.4), material="plaster")
         )
         self.room.blocks.append(
-            (np.array([-5.0, wall_y - 0.1, 0.0]), np.array([12.0, wall_y, 3.4]))
+            (np.array([-5.0, self.wall_y - 0.1, 0.0]), np.array([12.0, self.wall_y, 3.4]))
         )
         for level in self.supports[1:]:
             for x in self.rng.uniform([0.3, 2.4, 4.2], [1.2, 3.4, 5.4]):
@@ -441,17 +443,22 @@ class _Planner:
     def find_stations(self, n_stations: int) -> tuple[Vector, ...]:
         """Places around the rack with room for a tripod."""
         wished = [
-            (2.5, RACK_DEPTH + 2.6), (-1.0, 1.4), (RACK_LENGTH + 0.9, 1.4), (3.2, -0.6),
-            (0.2, RACK_DEPTH + 2.2), (5.8, RACK_DEPTH + 2.2),
-        ]  # fmt: skip
+            (1.3, RACK_DEPTH + 2.4),
+            (-1.2, 1.4),
+            (RACK_LENGTH + 1.1, 1.4),
+            (4.7, RACK_DEPTH + 2.4),
+            (-0.8, RACK_DEPTH + 1.5),
+            (RACK_LENGTH + 0.8, RACK_DEPTH + 1.5),
+        ]
+        low, high = np.array([-1.4, self.wall_y + 0.6]), np.array([RACK_LENGTH + 1.4, 6.6])
         found: list[Vector] = []
         spread = 0.1
         while len(found) < n_stations:
-            x, y = wished[len(found)] + spread * self.rng.standard_normal(2)
-            position = np.array([x, y, self.rng.uniform(1.4, 1.9)])
-            is_on_floor = -1.4 < x < RACK_LENGTH + 1.4 and -2.2 < y < 6.6
-            if is_on_floor and self.room.is_free(position, 0.35):
+            place = wished[len(found)] + spread * self.rng.standard_normal(2)
+            position = np.array([*place, self.rng.uniform(1.4, 1.9)])
+            is_inside = bool(np.all((place > low) & (place < high)))
+            if is_inside and self.room.is_free(position, 0.8):
                 found.append(_vector(position))
                 spread = 0.1
-            spread = min(1.15 * spread, 3.0)
+            spread = min(1.1 * spread, 2.0)
         return tuple(found)
