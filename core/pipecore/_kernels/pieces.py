@@ -17,7 +17,24 @@ def draw(state, n):
 
 @njit(cache=True, nogil=True)
 def on_line(
-    cx, cy, cz, ax, ay, az, r, sd, px, py, pz, dx, dy, dz, radius, slope, min_cos, max_offset,
+    cx,
+    cy,
+    cz,
+    ax,
+    ay,
+    az,
+    r,
+    sd,
+    px,
+    py,
+    pz,
+    dx,
+    dy,
+    dz,
+    radius,
+    slope,
+    min_cos,
+    max_offset,
     max_change,
 ):
     """Whether an ellipse fits a straight axis with a radius that is linear along it."""
@@ -78,9 +95,25 @@ def best_line(
         count = 0
         for k in range(n):
             if free[k] and on_line(
-                centre[k, 0], centre[k, 1], centre[k, 2], axis[k, 0], axis[k, 1], axis[k, 2],
-                radius[k], sd[k], centre[i, 0], centre[i, 1], centre[i, 2], dx, dy, dz,
-                start, slope, min_cos, max_offset, max_change,
+                centre[k, 0],
+                centre[k, 1],
+                centre[k, 2],
+                axis[k, 0],
+                axis[k, 1],
+                axis[k, 2],
+                radius[k],
+                sd[k],
+                centre[i, 0],
+                centre[i, 1],
+                centre[i, 2],
+                dx,
+                dy,
+                dz,
+                start,
+                slope,
+                min_cos,
+                max_offset,
+                max_change,
             ):
                 count += 1
         if count > best:
@@ -92,16 +125,49 @@ def best_line(
         return 0
     for k in range(n):
         inliers[k] = free[k] and on_line(
-            centre[k, 0], centre[k, 1], centre[k, 2], axis[k, 0], axis[k, 1], axis[k, 2],
-            radius[k], sd[k], line[0], line[1], line[2], line[3], line[4], line[5],
-            line[6], line[7], min_cos, max_offset, max_change,
+            centre[k, 0],
+            centre[k, 1],
+            centre[k, 2],
+            axis[k, 0],
+            axis[k, 1],
+            axis[k, 2],
+            radius[k],
+            sd[k],
+            line[0],
+            line[1],
+            line[2],
+            line[3],
+            line[4],
+            line[5],
+            line[6],
+            line[7],
+            min_cos,
+            max_offset,
+            max_change,
         )
     return best
 
 
 @njit(cache=True, nogil=True)
 def on_arc(
-    cx, cy, cz, ax, ay, az, r, sd, ox, oy, oz, nx, ny, nz, bend, radius, min_cos, max_offset,
+    cx,
+    cy,
+    cz,
+    ax,
+    ay,
+    az,
+    r,
+    sd,
+    ox,
+    oy,
+    oz,
+    nx,
+    ny,
+    nz,
+    bend,
+    radius,
+    min_cos,
+    max_offset,
     max_change,
 ):
     """Whether an ellipse fits a circular axis of constant radius."""
@@ -119,7 +185,9 @@ def on_arc(
 
 
 @njit(cache=True, nogil=True)
-def best_arc(centre, axis, radius, sd, free, n_trials, min_cos, max_offset, max_change, inliers, arc):
+def best_arc(
+    centre, axis, radius, sd, free, n_trials, min_cos, max_offset, max_change, inliers, arc
+):
     """Find the circular piece with most ellipses, from pairs of centres with their axes.
 
     Writes the inliers and the arc (centre, normal, bend radius); returns their number.
@@ -163,8 +231,25 @@ def best_arc(centre, axis, radius, sd, free, n_trials, min_cos, max_offset, max_
         count = 0
         for k in range(n):
             if free[k] and on_arc(
-                centre[k, 0], centre[k, 1], centre[k, 2], axis[k, 0], axis[k, 1], axis[k, 2],
-                radius[k], sd[k], ox, oy, oz, nx, ny, nz, bend, r, min_cos, max_offset, max_change,
+                centre[k, 0],
+                centre[k, 1],
+                centre[k, 2],
+                axis[k, 0],
+                axis[k, 1],
+                axis[k, 2],
+                radius[k],
+                sd[k],
+                ox,
+                oy,
+                oz,
+                nx,
+                ny,
+                nz,
+                bend,
+                r,
+                min_cos,
+                max_offset,
+                max_change,
             ):
                 count += 1
         if count > best:
@@ -176,8 +261,24 @@ def best_arc(centre, axis, radius, sd, free, n_trials, min_cos, max_offset, max_
         return 0
     for k in range(n):
         inliers[k] = free[k] and on_arc(
-            centre[k, 0], centre[k, 1], centre[k, 2], axis[k, 0], axis[k, 1], axis[k, 2],
-            radius[k], sd[k], arc[0], arc[1], arc[2], arc[3], arc[4], arc[5], arc[6], arc[7],
-            min_cos, max_offset, max_change,
+            centre[k, 0],
+            centre[k, 1],
+            centre[k, 2],
+            axis[k, 0],
+            axis[k, 1],
+            axis[k, 2],
+            radius[k],
+            sd[k],
+            arc[0],
+            arc[1],
+            arc[2],
+            arc[3],
+            arc[4],
+            arc[5],
+            arc[6],
+            arc[7],
+            min_cos,
+            max_offset,
+            max_change,
         )
     return best

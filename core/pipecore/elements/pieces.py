@@ -163,8 +163,8 @@ def _fit_line(e: Ellipses, chosen: NDArray[np.intp], is_tapered: bool) -> tuple[
     if not is_tapered:
         return LineSurface(middle, direction, _weighted_median(e.radius[chosen], weight)), along
     mean_s, mean_r = weight @ along, weight @ e.radius[chosen]
-    slope = weight @ ((along - mean_s) * (e.radius[chosen] - mean_r)) / (
-        weight @ (along - mean_s) ** 2
+    slope = (
+        weight @ ((along - mean_s) * (e.radius[chosen] - mean_r)) / (weight @ (along - mean_s) ** 2)
     )
     return LineSurface(middle, direction, mean_r - slope * mean_s, slope, is_tapered=True), along
 
@@ -198,7 +198,9 @@ def _take_arcs(ellipses: Ellipses, members: NDArray[np.intp]) -> list[Piece]:
             break
         chosen = np.flatnonzero(inliers)
         free[chosen] = False
-        model = ArcSurface(arc[:3].copy(), arc[3:6].copy(), arc[6], float(np.median(e.radius[chosen])))
+        model = ArcSurface(
+            arc[:3].copy(), arc[3:6].copy(), arc[6], float(np.median(e.radius[chosen]))
+        )
         low, high, part = arc_extent(model, e.centre[chosen])
         if len(part) < MIN_ELLIPSES or high - low < np.deg2rad(12.0):
             continue
@@ -262,7 +264,11 @@ def find_spheres(ellipses: Ellipses) -> list[Piece]:
         near = near[free[near] & (np.abs(radii[near] - radii[i]) < 0.05 * radii[i])]
         tried[near] = True
         # A sphere shows the same centre from well inside and far off it, on all sides.
-        spread = np.linalg.eigvalsh(np.cov((ellipses.centre[near] - centres[near]).T)) if len(near) > 3 else np.zeros(3)
+        spread = (
+            np.linalg.eigvalsh(np.cov((ellipses.centre[near] - centres[near]).T))
+            if len(near) > 3
+            else np.zeros(3)
+        )
         if len(near) < 8 or np.ptp(sine[near]) < 0.5 or spread[1] < (0.1 * radii[i]) ** 2:
             continue
         model = SphereSurface(np.median(centres[near], axis=0), float(np.median(radii[near])))

@@ -58,6 +58,11 @@ class LineSurface:
 
     radius_parameter = 4
 
+    @property
+    def position(self) -> Array:
+        """A point that tells it from others."""
+        return self.middle
+
     def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
         """Signed distances, derivatives and outward unit vectors."""
         e1, e2 = _across(self.direction)
@@ -101,6 +106,11 @@ class ArcSurface:
     radius: float
 
     radius_parameter = 6
+
+    @property
+    def position(self) -> Array:
+        """A point that tells it from others."""
+        return self.centre
 
     def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
         """Signed distances, derivatives and outward unit vectors."""
@@ -151,6 +161,11 @@ class SphereSurface:
     radius: float
 
     radius_parameter = 3
+
+    @property
+    def position(self) -> Array:
+        """A point that tells it from others."""
+        return self.centre
 
     def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
         """Signed distances, derivatives and outward unit vectors."""

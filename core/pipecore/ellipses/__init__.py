@@ -41,6 +41,8 @@ class Ellipses:
     stack_id, profile_index : ndarray of int32, shape (m,)
     centre : ndarray, shape (m, 3)
         Local coordinates.
+    normal : ndarray, shape (m, 3)
+        Unit normal of the profile's plane: its stack's direction.
     axis : ndarray, shape (m, 3)
         Unit direction of the pipe there, from the points' normals.
     radius, radius_sd : ndarray, shape (m,)
@@ -61,6 +63,7 @@ class Ellipses:
     stack_id: NDArray[np.int32]
     profile_index: NDArray[np.int32]
     centre: Array
+    normal: Array
     axis: Array
     radius: Array
     radius_sd: Array
@@ -161,14 +164,16 @@ def _competing_fits(curves: Curves, kept: NDArray[np.intp]) -> tuple[Array, Plan
     starts = np.concatenate([[0], np.cumsum(sizes)])
     rows = np.arange(starts[-1]) + np.repeat(curves.starts[kept] - starts[:-1], sizes)
     uv = curves.uv[rows]
-    group = np.repeat(np.arange(len(kept)), sizes)
-    centred = uv - (np.add.reduceat(uv, starts[:-1]) / sizes[:, None])[group]
-    uu, uv_, vv = (
-        np.add.reduceat(p, starts[:-1])
-        for p in (centred[:, 0] ** 2, centred[:, 0] * centred[:, 1], centred[:, 1] ** 2)
-    )
-    line_rss = 0.5 * (uu + vv) - np.hypot(0.5 * (uu - vv), uv_)
-    return line_rss, fit_direct_ellipses(uv, starts)
+    return line_rss(uv, starts), fit_direct_ellipses(uv, starts)
+
+
+def line_rss(points: Array, starts: NDArray[np.int64]) -> Array:
+    """Residual sum of squares of the best line through each group of points (n, 2)."""
+    counts = np.diff(starts)
+    mean = np.add.reduceat(points, starts[:-1]) / counts[:, None]
+    x, y = (points - np.repeat(mean, counts, axis=0)).T
+    xx, xy, yy = (np.add.reduceat(p, starts[:-1]) for p in (x * x, x * y, y * y))
+    return np.asarray(0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy))
 
 
 def _to_space(
@@ -190,6 +195,7 @@ def _to_space(
         stack_id=np.full(len(kept), curves.stack.stack_id, np.int32),
         profile_index=curves.profile_index[kept],
         centre=centre,
+        normal=np.broadcast_to(frame[2], centre.shape),
         axis=axis,
         radius=radius,
         radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),

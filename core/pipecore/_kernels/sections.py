@@ -1,0 +1,39 @@
+"""Circles of the sections across an element's own axis."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.circles import geometric_circle, taubin_circle
+from pipecore._kernels.ellipses import covered_arc
+
+
+@njit(cache=True, nogil=True)
+def fit_sections(x, y, starts, max_gap, fits):
+    """Fit a circle to each group of points; write centre x, y, radius, rms and arc.
+
+    All points weigh the same: a dent is meant to show. nan where there is no circle.
+    """
+    for c in range(starts.shape[0] - 1):
+        a, b = starts[c], starts[c + 1]
+        n = b - a
+        fits[c, :] = math.nan
+        if n < 5:
+            continue
+        weights = np.ones(n)
+        cx, cy, r = taubin_circle(x[a:b], y[a:b], weights)
+        if not r > 0.0:
+            continue
+        cx, cy, r = geometric_circle(x[a:b], y[a:b], cx, cy, r, math.inf, weights, 10)
+        if not r > 0.0:
+            continue
+        ss = 0.0
+        angles = np.empty(n)
+        for k in range(n):
+            dx, dy = x[a + k] - cx, y[a + k] - cy
+            ss += (math.sqrt(dx * dx + dy * dy) - r) ** 2
+            angles[k] = math.atan2(dy, dx)
+        fits[c, 0], fits[c, 1], fits[c, 2] = cx, cy, r
+        fits[c, 3] = math.sqrt(ss / max(n - 3, 1))
+        fits[c, 4] = covered_arc(np.sort(angles), max(max_gap / r, 0.2))

@@ -1,0 +1,207 @@
+"""Elements: pieces of axes refined, told true from false, joined to runs (paper, 3.3.5)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.catalogues import nominal_size
+from pipecore.elements.nearby import NearbyPoints
+from pipecore.elements.pieces import Piece, find_pieces
+from pipecore.elements.refine import Fitted, refine_piece
+from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
+from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
+from pipecore.ellipses import Ellipses
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.progress import Progress
+from pipecore.settings import ElementSettings
+from pipecore.types import NO_ID, Element, ElementKind
+
+__all__ = ["BuiltElements", "NearbyPoints", "build_elements", "find_pieces"]
+
+Array = NDArray[np.float64]
+
+MIN_COVERAGE = 0.5
+"""Share of an element's length that must be covered by points."""
+MIN_ARC = np.deg2rad(75.0)
+MAX_RADIUS_SD = 0.04
+"""Largest standard deviation of a radius, as a share of it."""
+FLANGE_RATIO = (1.12, 2.8)
+FLANGE_LENGTH = 0.9
+"""A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
+
+
+@dataclass(frozen=True, eq=False)
+class BuiltElements:
+    """Elements with the thinned points that are theirs.
+
+    Parameters
+    ----------
+    elements : tuple of Element
+        With what the refinement knows; ovality and straightness come later.
+    own : tuple of ndarray
+        Indices of each element's thinned points.
+    """
+
+    elements: tuple[Element, ...]
+    own: tuple[NDArray[np.intp], ...]
+
+
+def build_elements(
+    pieces: list[Piece],
+    nearby: NearbyPoints,
+    settings: ElementSettings,
+    progress: Progress,
+) -> BuiltElements:
+    """Refine pieces to elements, the best supported first; join them to runs.
+
+    Points that one element takes are no longer there for the next, so that every
+    surface is reported once.
+    """
+    fitted = refine_pieces(pieces, nearby, settings, progress)
+    axes = [f.axis for f in fitted]
+    spans = [Span(f.axis, (f.radius, f.radius_end)) for f in fitted]
+    links = []
+    for i, end_i, j, end_j in meeting_ends(spans):
+        links.append((i, j))
+        axes[i], axes[j] = _trimmed(axes[i], end_i, axes[j], end_j, fitted[i].radius)
+    kinds = [_kind(f) for f in fitted]
+    for i, j in flanges(fitted):
+        kinds[i] = ElementKind.FLANGE
+        links.append((i, j))
+    return _numbered(fitted, axes, kinds, number_runs(len(fitted), links), nearby, settings)
+
+
+def refine_pieces(
+    pieces: list[Piece], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
+) -> list[Fitted]:
+    """Refine the pieces with most ellipses first; drop what does not hold."""
+    is_free = np.ones(len(nearby.surface.xyz), np.bool_)
+    fitted = []
+    # Equal counts are told apart by place, not by the order in which they were found.
+    ordered = sorted(
+        pieces, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
+    )
+    for i, piece in enumerate(ordered):
+        progress.update("elements", 0.3 + 0.7 * i / len(ordered))
+        found = refine_piece(piece, nearby, is_free)
+        if found is not None and is_credible(found, nearby, settings):
+            is_free[found.own] = False
+            fitted.append(found)
+    progress.update("elements", 1.0)
+    return fitted
+
+
+def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) -> bool:
+    """Whether a refined piece is a pipe element and not a corner, a bundle or a chance."""
+    model = found.fit.model
+    radius = model.radius
+    if not settings.min_radius_mm <= radius * 1e3 <= settings.max_radius_mm:
+        return False
+    if found.fit.sigma > max(4.0 * nearby.surface.noise, 0.004) or found.fit.sigma > 0.08 * radius:
+        return False
+    if found.fit.radius_sd > MAX_RADIUS_SD * radius:
+        return False
+    if isinstance(model, SphereSurface):
+        return len(found.own) >= 60
+    if found.coverage < MIN_COVERAGE or found.arc < MIN_ARC:
+        return False
+    if isinstance(model, ArcSurface):
+        return model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
+    return found.axis.length > 2.0 * nearby.surface.voxel
+
+
+def _kind(found: Fitted) -> ElementKind:
+    match found.fit.model:
+        case LineSurface(is_tapered=True):
+            return ElementKind.CONE
+        case LineSurface():
+            return ElementKind.CYLINDER
+        case ArcSurface():
+            return ElementKind.TORUS
+    return ElementKind.SPHERE
+
+
+def _trimmed(
+    a: LineAxis | ArcAxis, end_a: int, b: LineAxis | ArcAxis, end_b: int, radius: float
+) -> tuple[LineAxis | ArcAxis, LineAxis | ArcAxis]:
+    if isinstance(a, LineAxis) and isinstance(b, ArcAxis):
+        return trim_to_tangent(a, end_a, b, end_b, 2.0 * radius)
+    if isinstance(a, ArcAxis) and isinstance(b, LineAxis):
+        line, arc = trim_to_tangent(b, end_b, a, end_a, 2.0 * radius)
+        return arc, line
+    return a, b
+
+
+def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
+    """Pairs (flange, pipe): short discs around the axis of a thinner pipe, at or on it."""
+    pipes = [
+        (j, f)
+        for j, f in enumerate(fitted)
+        if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered
+    ]
+    found = []
+    for i, disc in pipes:
+        if disc.axis.length > FLANGE_LENGTH * disc.radius:
+            continue
+        for j, pipe in pipes:
+            ratio = disc.radius / pipe.radius
+            if i == j or not FLANGE_RATIO[0] < ratio < FLANGE_RATIO[1]:
+                continue
+            if pipe.axis.length < 1.0 * pipe.radius:
+                continue
+            chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
+            turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
+            near = -2 * pipe.radius < chainage[0] < pipe.axis.length + 2 * pipe.radius
+            if near and rho[0] < 0.15 * pipe.radius and turn > np.cos(np.deg2rad(12.0)):
+                found.append((i, j))
+                break
+    return found
+
+
+def _numbered(
+    fitted: list[Fitted],
+    axes: list[LineAxis | ArcAxis],
+    kinds: list[ElementKind],
+    run: NDArray[np.int32],
+    nearby: NearbyPoints,
+    settings: ElementSettings,
+) -> BuiltElements:
+    """Elements in their final order: the longest run first, along each run."""
+    if not fitted:
+        return BuiltElements((), ())
+    length = np.bincount(run, [a.length for a in axes])
+    order = sorted(
+        range(len(fitted)),
+        key=lambda i: (-length[run[i]], run[i], *np.round(axes[i].at(axes[i].length / 2), 6)),
+    )
+    run_id: dict[int, int] = {}
+    elements, own = [], []
+    for i in order:
+        found = fitted[i]
+        model = found.fit.model
+        run_id.setdefault(int(run[i]), len(run_id) + 1)
+        moved = replace(found, axis=axes[i])
+        size = nominal_size(2 * found.radius, settings.catalogue, settings.size_tolerance_pct)
+        is_sized = kinds[i] in (ElementKind.CYLINDER, ElementKind.TORUS)
+        shift = float(found.axis.pipe_coordinates(axes[i].start[None])[0][0])
+        elements.append(
+            Element(
+                element_id=len(elements) + 1,
+                run_id=run_id[int(run[i])],
+                kind=kinds[i],
+                axis=axes[i],
+                radius=moved.radius,
+                radius_sd=found.fit.radius_sd,
+                radius_end=moved.radius_end,
+                centre=np.full(3, np.nan) if isinstance(model, LineSurface) else model.centre,
+                n_points=0,
+                n_profiles=0,
+                arc=found.arc,
+                rms=found.fit.sigma,
+                nominal=size if is_sized else None,
+                gaps=tuple((a - shift, b - shift) for a, b in found.gaps),
+            )
+        )
+        own.append(found.own)
+    return BuiltElements(tuple(elements), tuple(own))

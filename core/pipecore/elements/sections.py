@@ -1,0 +1,157 @@
+"""Profiles of elements: the normal stack across each one's own axis, and the stacks' ellipses."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels.sections import fit_sections
+from pipecore.ellipses import (
+    CIRCLE_PARAMETERS,
+    ELLIPSE_PARAMETERS,
+    FREE_FIT_ARC,
+    LINE_PARAMETERS,
+    Ellipses,
+    akaike,
+    fit_direct_ellipses,
+    line_rss,
+    radius_sd_factor,
+)
+from pipecore.types import OWN_STACK, Element, Profiles
+
+Array = NDArray[np.float64]
+
+MIN_POINTS = 8
+
+
+def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float) -> Profiles:
+    """Cut an element's points into profiles across its own axis and fit each.
+
+    Parameters
+    ----------
+    element : Element
+    xyz : ndarray, shape (n, 3)
+        Points of its surface.
+    width : float
+        Profile width, metres.
+    spacing : float
+        Distance between neighbouring points, metres; wider gaps around the axis are not
+        counted as seen.
+
+    Returns
+    -------
+    Profiles
+        One row per profile with at least eight points and a circle, `stack_id` is
+        `OWN_STACK`. Semi-axes and ovality are those of the free direct ellipse where the
+        points cover 240° or more; on shorter arcs that fit collapses, so there the
+        ellipse is the circle and the ovality not measurable.
+    """
+    axis = element.axis
+    chainage, rho, clock = axis.pipe_coordinates(xyz)
+    inside = (chainage >= 0) & (chainage < axis.length)
+    index = (chainage[inside] / width).astype(np.int32)
+    order = np.argsort(index, kind="stable")
+    index = index[order]
+    # Up and right of the axis, scaled so that a cone's or sphere's taper within a profile
+    # does not thicken the section.
+    middle = (index + 0.5) * width
+    taper = element.radius_at(middle) - element.radius_at(chainage[inside][order])
+    rho = rho[inside][order] + taper
+    clock = clock[inside][order]
+    up_right = np.stack([rho * np.cos(clock), rho * np.sin(clock)], axis=1)
+    rows, first = np.unique(index, return_index=True)
+    starts = np.append(first, len(index)).astype(np.int64)
+    if len(rows) == 0:
+        return Profiles.empty()
+    fits = np.empty((len(rows), 5))
+    fit_sections(
+        np.ascontiguousarray(up_right[:, 0]), np.ascontiguousarray(up_right[:, 1]),
+        starts, 4.0 * spacing, fits,
+    )  # fmt: skip
+    free = fit_direct_ellipses(up_right, starts)
+    n_points = np.diff(starts)
+    radius, rms, arc = fits[:, 2], fits[:, 3], fits[:, 4]
+    is_free = (arc >= FREE_FIT_ARC) & np.isfinite(free.semi_minor) & (n_points >= 12)
+    semi_minor = np.where(is_free, free.semi_minor, radius)
+    semi_major = np.where(is_free, free.semi_major, radius)
+    angle = np.where(is_free, free.angle, 0.0)
+
+    at = (rows + 0.5) * width
+    up, right = axis.frame(at)
+    nominal = element.radius_at(at)
+    table = Profiles(
+        element_id=np.full(len(rows), element.element_id, np.int32),
+        stack_id=np.full(len(rows), OWN_STACK, np.int32),
+        profile_index=rows.astype(np.int32),
+        chainage=at,
+        centre=axis.at(at) + fits[:, :1] * up + fits[:, 1:2] * right,
+        normal=np.array(axis.tangent(at)),
+        major_direction=np.cos(angle)[:, None] * up + np.sin(angle)[:, None] * right,
+        semi_minor=semi_minor,
+        semi_major=semi_major,
+        radius=radius,
+        radius_sd=rms * radius_sd_factor(arc) / np.sqrt(n_points),
+        ovality=np.where(is_free, (semi_major - semi_minor) / nominal, np.nan),
+        centre_deviation=np.hypot(fits[:, 0], fits[:, 1]),
+        radius_deviation=radius - nominal,
+        arc=arc,
+        n_points=n_points.astype(np.int32),
+        rms=rms,
+        aic_line=akaike(LINE_PARAMETERS, n_points, line_rss(up_right, starts)),
+        aic_ellipse=np.where(
+            is_free,
+            akaike(ELLIPSE_PARAMETERS, n_points, free.rss),
+            akaike(CIRCLE_PARAMETERS, n_points, rms**2 * n_points),
+        ),
+    )
+    with np.errstate(invalid="ignore"):
+        return table[(n_points >= MIN_POINTS) & (radius > 0) & (arc > np.deg2rad(40.0))]
+
+
+def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Profiles:
+    """Rows of the stacks' ellipses, each with the element whose surface it cuts.
+
+    An ellipse is an element's if its centre lies on the axis, its direction along it and
+    its radius is the element's there.
+    """
+    tables = []
+    free = np.ones(len(ellipses), np.bool_)
+    for element in elements:
+        axis = element.axis
+        chainage, rho, _ = axis.pipe_coordinates(ellipses.centre)
+        expected = element.radius_at(np.clip(chainage, 0.0, axis.length))
+        along = np.abs(np.einsum("ij,ij->i", axis.tangent(chainage), ellipses.axis))
+        slack = 2 * ellipses.radius_sd
+        own = (
+            free
+            & (chainage >= 0)
+            & (chainage <= axis.length)
+            & (rho < 0.25 * expected + slack)
+            & (np.abs(ellipses.radius - expected) < 0.25 * expected + slack)
+            & (along > np.cos(np.deg2rad(20.0)))
+        )
+        free &= ~own
+        rows = np.flatnonzero(own)
+        e = ellipses[rows]
+        at = chainage[rows]
+        table = Profiles(
+            element_id=np.full(len(rows), element.element_id, np.int32),
+            stack_id=e.stack_id,
+            profile_index=e.profile_index,
+            chainage=at,
+            centre=e.centre,
+            normal=e.normal,
+            major_direction=e.major_direction,
+            semi_minor=e.semi_minor,
+            semi_major=e.semi_major,
+            radius=e.radius,
+            radius_sd=e.radius_sd,
+            ovality=np.full(len(rows), np.nan),
+            centre_deviation=rho[rows],
+            radius_deviation=e.radius - expected[rows],
+            arc=e.arc,
+            n_points=e.n_points,
+            rms=e.rms,
+            aic_line=e.aic_line,
+            aic_ellipse=e.aic_ellipse,
+        )
+        tables.append(table[np.lexsort((at, e.stack_id))])
+    return Profiles.concatenate(tables)

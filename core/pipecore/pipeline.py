@@ -1,0 +1,138 @@
+"""The pipeline, in the paper's order."""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from pipecore.axes import join_centres
+from pipecore.elements import NearbyPoints, build_elements, find_pieces
+from pipecore.elements.sections import tabulate_ellipses
+from pipecore.ellipses import Ellipses, fit_ellipses
+from pipecore.measurement import measure_elements
+from pipecore.profiles import segment_profiles
+from pipecore.progress import NoProgress, Progress
+from pipecore.rules import Rule, judge, load_rule
+from pipecore.segments import overlay_stacks
+from pipecore.settings import Settings
+from pipecore.stacks import choose_stacks
+from pipecore.surface import sample_surface
+from pipecore.types import Deformation, Element, PointCloud, Profiles, Result
+
+STAGES = {
+    "thinning": 0.08,
+    "normals": 0.10,
+    "directions": 0.04,
+    "profiles": 0.22,
+    "segments": 0.03,
+    "ellipses": 0.08,
+    "axes": 0.03,
+    "elements": 0.22,
+    "deformations": 0.20,
+}
+"""The stages in their order, with the share of the time that each usually takes."""
+
+
+def detect(
+    cloud: PointCloud, settings: Settings = Settings(), progress: Progress = NoProgress()
+) -> Result:
+    """Find the elements of a cloud and their deformations.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+    progress : Progress
+        Told the stages of `STAGES`.
+
+    Returns
+    -------
+    Result
+        With no elements if the cloud shows none.
+
+    Raises
+    ------
+    CancelledError
+        If `progress` raises it.
+    SettingsError
+        If the acceptance rule of the settings cannot be read.
+    """
+    rule = load_rule(settings.deformation.rule)
+    seconds: dict[str, float] = {}
+    max_radius = settings.elements.max_radius_mm / 1e3
+    with _timed(seconds, "surface"):
+        surface = sample_surface(cloud, settings.thinning, progress)
+    with _timed(seconds, "stacks"):
+        stacks = choose_stacks(surface, settings.stacks, progress)
+    with _timed(seconds, "profiles"):
+        curves = [
+            segment_profiles(surface, stack, settings.profiles, max_radius, progress, span)
+            for stack, span in _shares(stacks)
+        ]
+    with _timed(seconds, "segments"):
+        segments = overlay_stacks(curves, len(surface.xyz), progress)
+    with _timed(seconds, "ellipses"):
+        ellipses = Ellipses.concatenate(
+            [
+                fit_ellipses(c, surface, settings.ellipses, settings.elements, progress, span)
+                for c, span in _shares(curves)
+            ]
+        )
+    with _timed(seconds, "axes"):
+        width = float(np.median([s.width for s in stacks]))
+        chains = join_centres(ellipses, width, progress)
+    with _timed(seconds, "elements"):
+        pieces = find_pieces(ellipses, chains, width, progress)
+        nearby = NearbyPoints(cloud, surface)
+        built = build_elements(pieces, nearby, settings.elements, progress)
+        profiles = tabulate_ellipses(built.elements, ellipses)
+    with _timed(seconds, "deformations"):
+        measured = measure_elements(
+            built, nearby, len(cloud), width, settings.deformation, progress
+        )
+        deformations = judge_deformations(measured.deformations, measured.elements, rule)
+    return Result(
+        settings=settings,
+        origin=cloud.origin,
+        source=cloud.source,
+        n_cloud_points=len(cloud),
+        stacks=stacks,
+        elements=measured.elements,
+        profiles=Profiles.concatenate([measured.profiles, profiles]),
+        deformations=deformations,
+        segment_id=segments[surface.parent],
+        element_id=measured.element_id,
+        deviation=measured.deviation,
+        seconds=seconds,
+    )
+
+
+def judge_deformations(
+    deformations: tuple[Deformation, ...], elements: tuple[Element, ...], rule: Rule
+) -> tuple[Deformation, ...]:
+    """Number the deformations and give each the verdict of a rule."""
+    return tuple(
+        replace(
+            d, deformation_id=i, rule=rule.name, verdict=judge(d, elements[d.element_id - 1], rule)
+        )
+        for i, d in enumerate(deformations, start=1)
+    )
+
+
+Item = TypeVar("Item")
+
+
+def _shares(items: Sequence[Item]) -> Iterator[tuple[Item, tuple[float, float]]]:
+    """Each item with the part of its stage that it is."""
+    for i, item in enumerate(items):
+        yield item, (i / len(items), (i + 1) / len(items))
+
+
+@contextmanager
+def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
+    start = time.perf_counter()
+    yield
+    seconds[step] = time.perf_counter() - start
