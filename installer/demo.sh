@@ -5,6 +5,7 @@ set -eu
 cd "$(dirname "$0")/.."
 scan=$1 report=$2
 
+mkdir -p "$(dirname "$report")"
 .venv/bin/pipecore detect "$scan" -o "$report" --overwrite
 if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
     echo "Opening $scan in PipeGUI …"
