@@ -29,6 +29,7 @@ class Console:
         self._shows_stages = shows_stages
         self._bar: Any = None
         self._stage = ""
+        self._stages_seen: set[str] = set()
         self._stage_began = 0.0
         self._is_cancelled = False
         self._old_handlers: dict[signal.Signals, Any] = {}
@@ -62,13 +63,15 @@ class Console:
             raise CancelledError
         if self._is_quiet:
             return
-        if stage != self._stage:
+        if stage not in self._stages_seen:
             self._end_stage(is_done=True)
             self._begin_stage(stage)
-        if self._bar is not None:
-            self._bar.update(fraction * 100 - self._bar.n)
+        # Work may look back into a former stage; the bar does not.
+        if self._bar is not None and stage == self._stage:
+            self._bar.update(max(0.0, 100 * fraction - self._bar.n))
 
     def _begin_stage(self, stage: str) -> None:
+        self._stages_seen.add(stage)
         self._stage, self._stage_began = stage, time.monotonic()
         if sys.stderr.isatty():
             from tqdm import tqdm  # noqa: PLC0415
