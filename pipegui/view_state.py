@@ -33,6 +33,7 @@ Array = NDArray[np.float64]
 NO_PROFILES = Profiles.empty()
 NOTHING = np.empty(0)
 NO_POINTS_UV = np.empty((0, 2))
+NO_POINTS = np.empty((0, 3))
 
 
 class _ComparedByParts:
@@ -53,7 +54,8 @@ class SceneState(_ComparedByParts):
     """The parts of the document that the 3D view shows.
 
     `scan_key` differs between scans: a new one is fitted into the view. `profile` is
-    the selected profile as a table of one row, or None.
+    the selected profile as a table of one row, or None; `profile_xyz` are its points,
+    shape (n, 3).
     """
 
     scan_key: str = ""
@@ -62,6 +64,7 @@ class SceneState(_ComparedByParts):
     selection: Selection = Selection()
     view: ViewOptions = ViewOptions()
     profile: Profiles | None = None
+    profile_xyz: Array = field(default_factory=lambda: NO_POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,10 +233,13 @@ def resolve(document: Document) -> ViewState:
     """Return what each part of the window shows for `document`."""
     scan, result = document.scan, document.result
     selection, view = document.selection, document.view
-    profile, shown = None, None
+    profile, profile_xyz, shown = None, NO_POINTS, None
     if result is not None:
         if selection.profile is not None:
             profile = _profile(result, selection.element_id, selection.profile)
+            if profile is not None:
+                args = scan.cloud, result, selection.element_id, selection.profile
+                profile_xyz = _profile_xyz(*args)
         shown = selecting.shown_profile(result, selection)
     return ViewState(
         window=WindowState(scan, view, selection != Selection()),
@@ -244,6 +250,7 @@ def resolve(document: Document) -> ViewState:
             selection=selection,
             view=view,
             profile=profile,
+            profile_xyz=profile_xyz,
         ),
         tree=TreeState(document.scans, document.active, selection, view.hidden_elements),
         stacks=StacksState(
@@ -376,7 +383,7 @@ def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey
 
     siblings = _profiles(result, element_id)
     siblings = siblings[siblings.stack_id == key.stack_id]
-    xyz = _profile_points(cloud, result, key, profile, siblings)
+    xyz = _profile_xyz(cloud, result, element_id, key)
 
     major = profile.major_direction[0]
     fitted = Ellipse(
@@ -410,12 +417,15 @@ def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey
     )
 
 
-def _profile_points(
-    cloud: PointCloud, result: Result, key: ProfileKey, profile: Profiles, siblings: Profiles
-) -> Array:
+@lru_cache(maxsize=8)
+def _profile_xyz(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> Array:
     """Points of the element that lie in one profile, float64."""
-    chainages, _, _, index = _surface(cloud, result, int(profile.element_id[0]))
+    profile = _profile(result, element_id, key)
+    assert profile is not None
+    chainages, _, _, index = _surface(cloud, result, element_id)
     if key.stack_id == OWN_STACK:
+        siblings = _profiles(result, element_id)
+        siblings = siblings[siblings.stack_id == OWN_STACK]
         # Neighbouring own profiles touch, so their spacing is their width.
         width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
         inside = np.abs(chainages - profile.chainage[0]) <= width / 2
