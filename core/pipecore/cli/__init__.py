@@ -29,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             # Imported when needed: `--help` and `info` do not wait for numba.
             importlib.import_module(f"pipecore.cli.{args.command}").run(args, console)
-        except CancelledError:
+        except (CancelledError, KeyboardInterrupt):
             console.complain("Cancelled; nothing was written.")
             return CANCELLED
         except PipecoreError as error:
