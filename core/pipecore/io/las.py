@@ -1,19 +1,18 @@
 """LAS and LAZ, by laspy and lazrs."""
 
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipecore.io.crs import name_in_wkt
+from pipecore.io.las_check import check_chunks, check_header
 from pipecore.io.source import (
     CHUNK_POINTS,
     Chunk,
     Source,
-    damaged,
     told_as_read_errors,
     truncated,
 )
@@ -21,9 +20,7 @@ from pipecore.io.source import (
 if TYPE_CHECKING:
     import laspy
 
-_COMPRESSED = 0x80
-_RECORD_SIZES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)
-"""Smallest size of a point record of formats 0 to 10, bytes."""
+LARGEST_PARALLEL_CHUNK = 2_000_000
 
 
 @contextmanager
@@ -35,7 +32,7 @@ def open_source(path: Path) -> Iterator[Source]:
         file = path.open("rb")
     with file:
         with told_as_read_errors(path, "LAS"):
-            _check_header(file, path)
+            check_header(file, path)
             wanted = laspy.DecompressionSelection
             reader = laspy.LasReader(
                 file,
@@ -48,7 +45,10 @@ def open_source(path: Path) -> Iterator[Source]:
             )
             header = reader.header
             if header.are_points_compressed and header.point_count:
-                _check_chunks(file, path, header)
+                largest = check_chunks(file, path, header)
+                if largest > LARGEST_PARALLEL_CHUNK:
+                    # In parallel, whole chunks of that size would be held in memory.
+                    reader.laz_backend = (laspy.LazBackend.Lazrs,)
             bounds = np.array([header.mins, header.maxs])
         yield Source(
             chunks=_chunks(reader, path),
@@ -84,77 +84,6 @@ def _chunks(reader: "laspy.LasReader", path: Path) -> Iterator[Chunk]:
                 rgb=rgb,
                 classification=np.asarray(points["classification"], dtype=np.uint8),
             )
-
-
-def _check_header(file: BinaryIO, path: Path) -> None:
-    """Hold the sizes and counts of the header against the file's size.
-
-    laspy and lazrs allocate and loop on their word alone.
-    """
-    size = path.stat().st_size
-    head = file.read(375)
-    if len(head) < 227:
-        raise damaged(path, "LAS", "its header is cut off")
-    minor = head[25]
-    start, n_vlrs, kind, record_size, n_points = struct.unpack_from("<IIBHI", head, 96)
-    if minor >= 4 and len(head) == 375:
-        evlr_start, n_evlrs, n_points = struct.unpack_from("<QIQ", head, 235)
-        _check_extended_records(file, path, evlr_start, n_evlrs, size)
-    if start > size or 227 + 54 * n_vlrs > start:
-        raise damaged(path, "LAS", "its header points beyond its end")
-    point_format = kind & 0x3F
-    if point_format >= len(_RECORD_SIZES) or record_size < _RECORD_SIZES[point_format]:
-        raise damaged(path, "LAS", "its header names no known point format")
-    if not kind & _COMPRESSED:
-        n_held = (size - start) // record_size
-        if n_points > n_held:
-            raise truncated(path, n_points, n_held)
-    elif n_points:
-        _check_chunk_table(file, path, start, size)
-    file.seek(0)
-
-
-def _check_extended_records(file: BinaryIO, path: Path, start: int, n: int, size: int) -> None:
-    for _ in range(n):
-        file.seek(start + 20)
-        length = file.read(8)
-        start += 60 + int.from_bytes(length, "little")
-        if len(length) < 8 or start > size:
-            raise damaged(path, "LAS", "its header points beyond its end")
-
-
-def _check_chunk_table(file: BinaryIO, path: Path, start: int, size: int) -> None:
-    file.seek(start)
-    place = file.read(8)
-    if len(place) < 8:
-        raise damaged(path, "LAZ", "it is truncated")
-    (table,) = struct.unpack("<q", place)
-    if table == -1:  # Written by a stream that could not go back: it stands at the end.
-        file.seek(size - 8)
-        (table,) = struct.unpack("<q", file.read(8))
-    if not start < table <= size - 8:
-        raise damaged(path, "LAZ", "it is truncated")
-    file.seek(table + 4)
-    (n_chunks,) = struct.unpack("<I", file.read(4))
-    if n_chunks > table - start:
-        raise damaged(path, "LAZ", "its table of chunks makes no sense")
-
-
-def _check_chunks(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> None:
-    """Refuse chunks that are larger than the file before the decoder makes room for them."""
-    import lazrs  # type: ignore[import-untyped]  # noqa: PLC0415
-
-    packing = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
-    if packing.item_size() != header.point_format.size:
-        raise damaged(path, "LAZ", "the size of its points contradicts itself")
-    file.seek(header.offset_to_point_data)
-    chunks = lazrs.read_chunk_table(file, packing)
-    if sum(n_bytes for _, n_bytes in chunks) > path.stat().st_size:
-        raise damaged(path, "LAZ", "it is truncated")
-    n_held = sum(n_points for n_points, _ in chunks)
-    if header.point_count > n_held:
-        raise truncated(path, header.point_count, n_held)
-    file.seek(header.offset_to_point_data)
 
 
 _KEY_DIRECTORY, _KEY_TEXTS = 34735, 34737

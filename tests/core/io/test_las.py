@@ -9,24 +9,10 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import ReadError
+from tests.core.io.writers import write_las
 
 COUNT_AT, START_AT, N_VLRS_AT = 247, 96, 100
 WKT = 'COMPD_CS["ETRS89 / UTM 32N + DHHN2016",PROJCS["ETRS89 / UTM zone 32N",GEOGCS["x"]]]'
-
-
-def write_las(path: Path, points: Any, *, point_format: int = 7, colour_factor: int = 257) -> Path:
-    """Write points by laspy alone."""
-    header = laspy.LasHeader(point_format=point_format, version="1.4")
-    header.scales = np.full(3, 1e-4)
-    header.offsets = np.floor(points.xyz.min(axis=0))
-    las = laspy.LasData(header)
-    las.xyz = points.xyz
-    las.intensity = points.intensity
-    las.classification = points.intensity % 32
-    if point_format == 7:
-        las.red, las.green, las.blue = points.rgb.T.astype(np.uint16) * colour_factor
-    las.write(path)
-    return path
 
 
 @pytest.mark.parametrize("name", ["scan.las", "scan.laz"])

@@ -7,52 +7,7 @@ import pytest
 from pipecore import io
 from pipecore.errors import ReadError
 from pipecore.io import lzf
-
-HEADER = """# .PCD v0.7 - Point Cloud Data file format
-VERSION 0.7
-FIELDS x y z intensity rgb
-SIZE 8 8 8 4 4
-TYPE F F F F {kind}
-COUNT 1 1 1 1 1
-WIDTH {n}
-HEIGHT 1
-VIEWPOINT {station} 1 0 0 0
-POINTS {n}
-DATA {data}
-"""
-
-
-def literal_lzf(data: bytes) -> bytes:
-    """Pack as literals only: valid LZF of the simplest kind."""
-    parts = [data[i : i + 32] for i in range(0, len(data), 32)]
-    return b"".join(bytes([len(part) - 1]) + part for part in parts)
-
-
-def write_pcd(path: Path, points: Any, data: str, kind: str = "F", station: str = "0 0 0") -> Path:
-    """Write points as the format's description has it."""
-    red, green, blue = points.rgb.astype(np.uint32).T
-    packed = red << 16 | green << 8 | blue
-    fields = [("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("i", "<f4"), ("rgb", "<u4")]
-    records = np.empty(len(packed), dtype=fields)
-    for axis, name in enumerate("xyz"):
-        records[name] = points.xyz[:, axis]
-    records["i"], records["rgb"] = points.intensity, packed
-    header = HEADER.format(n=len(packed), data=data, kind=kind, station=station).encode()
-    if data == "binary":
-        body = records.tobytes()
-    elif data == "binary_compressed":
-        plain = b"".join(records[name].tobytes() for name, _ in fields)
-        stream = literal_lzf(plain)
-        body = np.array([len(stream), len(plain)], dtype="<u4").tobytes() + stream
-    else:
-        colours = packed.view(np.float32) if kind == "F" else packed
-        lines = (
-            f"{x:.4f} {y:.4f} {z:.4f} {i} {c!s}"
-            for (x, y, z), i, c in zip(points.xyz, points.intensity, colours.tolist(), strict=True)
-        )
-        body = "\n".join(lines).encode()
-    path.write_bytes(header + body)
-    return path
+from tests.core.io.writers import write_pcd
 
 
 @pytest.mark.parametrize("data", ["ascii", "binary", "binary_compressed"])

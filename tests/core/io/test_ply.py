@@ -7,14 +7,9 @@ from plyfile import PlyData, PlyElement
 
 from pipecore import io
 from pipecore.errors import ReadError
+from tests.core.io.writers import vertices
 
 ENCODINGS = [(True, "="), (False, "<"), (False, ">")]
-
-
-def vertices(points: Any, kind: str = "f8", intensity: str = "scalar_Intensity") -> PlyElement:
-    fields = [("x", kind), ("y", kind), ("z", kind), (intensity, "f4")]
-    fields += [(colour, "u1") for colour in ("red", "green", "blue")]
-    return PlyElement.describe(np.array(points.rows(), dtype=fields), "vertex")
 
 
 @pytest.mark.parametrize(("text", "byte_order"), ENCODINGS)

@@ -7,34 +7,7 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import ReadError
-
-
-def lines(points: Any, form: str) -> str:
-    return "".join(form.format(*row) + "\n" for row in points.rows())
-
-
-FORMS = {
-    "plain.xyz": ("", "{0:.4f} {1:.4f} {2:.4f} {3} {4} {5} {6}"),
-    "wide.asc": ("", "  {0:.4f}\t {1:.4f}   {2:.4f} {3} {4} {5} {6}  "),
-    "count.pts": ("1000\n", "{0:.4f} {1:.4f} {2:.4f} {3} {4} {5} {6}"),
-    "excel.csv": ("X;Y;Z;Intensity;R;G;B\n", "{0:.4f};{1:.4f};{2:.4f};{3};{4};{5};{6}"),
-    "english.csv": (
-        "red,green,blue,reflectance,h,n,e\n",
-        "{4},{5},{6},{3},{2:.4f},{1:.4f},{0:.4f}",
-    ),
-    "cc.txt": ("//X Y Z R G B Scalar_Intensity\n", "{0:.4f} {1:.4f} {2:.4f} {4} {5} {6} {3}"),
-    "cc_bare.txt": ("", "{0:.4f} {1:.4f} {2:.4f} {4} {5} {6} {3}"),
-    "units.csv": (
-        '"Easting [m]","Northing [m]","Height [m]","i","r","g","b"\n',
-        "{0:.4f}, {1:.4f}, {2:.4f}, {3}, {4}, {5}, {6}",
-    ),
-    "named.csv": (
-        "name,x,y,z,intensity,r,g,b,note\n",
-        "P{3},{0:.4f},{1:.4f},{2:.4f},{3},{4},{5},{6},wall",
-    ),
-    "remark.txt": ("# a remark\n\n# more\n", "{0:.4f} {1:.4f} {2:.4f} {3} {4} {5} {6}"),
-    "trailing.csv": ("", "{0:.4f},{1:.4f},{2:.4f},{3},{4},{5},{6},"),
-}
+from tests.core.io.writers import FORMS, lines
 
 
 @pytest.mark.parametrize("name", FORMS)
