@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDockWidget, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QDockWidget, QMenu, QTabWidget, QVBoxLayout, QWidget
 
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.panels.message_bar import MessageBar
@@ -111,9 +111,8 @@ def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidget
     window.addDockWidget(area, dock)
 
 
-def _panel_menu(window: "MainWindow"):
-    menu = window.menuBar().addMenu("Panels")
-    window.menuBar().removeAction(menu.menuAction())
+def _panel_menu(window: "MainWindow") -> QMenu:
+    menu = QMenu("Panels", window)
     for dock in window.panels.docks.values():
         menu.addAction(dock.toggleViewAction())
     return menu
@@ -126,21 +125,17 @@ def _restore(window: "MainWindow") -> None:
         window.resize(min(1600, available.width()), min(1000, available.height()))
     if state is not None and window.restoreState(state, LAYOUT_VERSION):
         return
+    # Docks take sizes only once the window has been laid out.
+    QTimer.singleShot(0, window, lambda: _set_default_sizes(window))
+
+
+def _set_default_sizes(window: "MainWindow") -> None:
     width, height = window.width(), window.height()
     docks = window.panels.docks
-    window.resizeDocks(
-        [docks["Project"], docks["Element"]],
-        [max(260, width * 17 // 100), max(340, width * 26 // 100)],
-        Qt.Orientation.Horizontal,
-    )
-    window.resizeDocks([docks["Deformations"]], [max(200, height // 4)], Qt.Orientation.Vertical)
-    window.resizeDocks(
-        [docks["Project"], docks["Stacks"]],
-        [height * 55 // 100, height * 45 // 100],
-        Qt.Orientation.Vertical,
-    )
-    window.resizeDocks(
-        [docks["Element"], docks["Properties"]],
-        [height * 45 // 100, height * 35 // 100],
-        Qt.Orientation.Vertical,
-    )
+    across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
+    sides = [max(248, width * 17 // 100), max(328, width * 27 // 100)]
+    window.resizeDocks([docks["Project"], docks["Element"]], sides, across)
+    window.resizeDocks([docks["Deformations"]], [max(190, height * 22 // 100)], down)
+    halves = [height * 55 // 100, height * 45 // 100]
+    window.resizeDocks([docks["Project"], docks["Stacks"]], halves, down)
+    window.resizeDocks([docks["Element"], docks["Properties"]], halves, down)

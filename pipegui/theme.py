@@ -96,7 +96,11 @@ def _palette() -> QPalette:
         (roles.ToolTipBase, "base"),
         (roles.ToolTipText, "text"),
         (roles.PlaceholderText, "muted"),
+        (roles.Light, "border"),
+        (roles.Midlight, "border"),
         (roles.Mid, "border"),
+        (roles.Dark, "border"),
+        (roles.Shadow, "border"),
         (roles.Highlight, "accent"),
         (roles.Link, "accent"),
     ):

@@ -221,9 +221,8 @@ class DeformationFilter(QSortFilterProxyModel):
         self, kind: DeformationKind | None, verdict: Verdict | None, min_depth_mm: float
     ) -> None:
         """Show only what is of this kind and verdict (None: any) and at least this deep."""
-        self.beginFilterChange()
         self.kind, self.verdict, self.min_depth_mm = kind, verdict, min_depth_mm
-        self.endFilterChange(QSortFilterProxyModel.Direction.Rows)
+        self.invalidate()
 
     def filterAcceptsRow(self, source_row: int, source_parent: Index) -> bool:  # noqa: N802
         """Whether a deformation is shown."""
@@ -231,7 +230,8 @@ class DeformationFilter(QSortFilterProxyModel):
         return (
             self.kind in (None, deformation.kind)
             and self.verdict in (None, deformation.verdict)
-            and not 1000 * deformation.depth < self.min_depth_mm
+            # Without a depth a deformation is rather shown than overlooked.
+            and not bool(1000 * deformation.depth < self.min_depth_mm)
         )
 
     def lessThan(self, left: Index, right: Index) -> bool:  # noqa: N802
@@ -241,4 +241,4 @@ class DeformationFilter(QSortFilterProxyModel):
         b = model.sort_key(right.row(), right.column())
         if isinstance(a, float) and isinstance(b, float) and (isnan(a) or isnan(b)):
             return not isnan(a)
-        return a < b
+        return bool(a < b)  # numpy's own bool crashes Qt

@@ -114,9 +114,6 @@ class DeformationTable(QWidget):
             if is_new:
                 self.model.set_result(state.result)
                 self.view.resizeColumnsToContents()
-                for column in range(len(COLUMNS) - 1):
-                    width = self.view.columnWidth(column) + theme.SPACING
-                    self.view.setColumnWidth(column, width)
             if is_new or state.selected != before.selected:
                 self._show_selected()
         self._stack.setCurrentWidget(self._table if self.model.rowCount() else self._empty)

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from pipecore.settings import DirectionPreset
 from pipecore.types import NO_ID, Stack
 from pipegui import theme
-from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
 from pipegui.view_state import StacksState
 
 PRESET_TEXT = {
@@ -55,6 +55,10 @@ class StacksPanel(QWidget):
         self.preset.setToolTip("Directions in which stacks are cut besides your own")
         for preset, text in PRESET_TEXT.items():
             self.preset.addItem(text, preset)
+        self.preset.setSizeAdjustPolicy(
+            QuietComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
+        )
+        self.preset.setMinimumContentsLength(8)
         self.preset.currentIndexChanged.connect(self._tell_preset)
         self.list = QTreeWidget()
         self.list.setAccessibleName("Stacks")
@@ -77,6 +81,7 @@ class StacksPanel(QWidget):
         self.editor.accepted.connect(self._accept)
         self.editor.hide()
         self._edited: int | None = None
+        self._empty = EmptyHint("The stacks of profiles appear here once a scan has been detected.")
         self._lay_out()
         self.apply(StacksState())
 
@@ -105,6 +110,7 @@ class StacksPanel(QWidget):
         column.addLayout(top)
         column.addWidget(self.editor)
         column.addWidget(self.list, 1)
+        column.addWidget(self._empty, 1)
 
     def apply(self, state: StacksState) -> None:
         """Show a state."""
@@ -125,6 +131,9 @@ class StacksPanel(QWidget):
                 item = self.list.topLevelItem(row)
                 if selected is not None and item.data(NAME, OWN_INDEX) == selected:
                     self.list.setCurrentItem(item)
+        has_stacks = self.list.topLevelItemCount() > 0
+        self.list.setVisible(has_stacks)
+        self._empty.setVisible(not has_stacks)
         self._enable()
 
     def _add_cut(self, stack: Stack, n_profiles: int, own: int | None, is_shown: bool) -> None:
@@ -232,7 +241,9 @@ class StackEditor(QWidget):
             button.setToolTip(f"Along the {button.text()} axis")
             button.clicked.connect(lambda _=False, axis=axis: self._set(axis))
             grid.addWidget(button, 2, column)
+            button.setMinimumWidth(5 * theme.SPACING)
         self.from_view = QPushButton("View")
+        self.from_view.setMinimumWidth(7 * theme.SPACING)
         self.from_view.setToolTip("The direction in which the 3D view looks")
         self.from_view.clicked.connect(self._take_view)
         grid.addWidget(self.from_view, 2, 0)
@@ -249,6 +260,7 @@ class StackEditor(QWidget):
         field.setRange(-1, 1)
         field.setDecimals(3)
         field.setSingleStep(0.1)
+        field.setMinimumWidth(6 * theme.SPACING)
         field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
         field.valueChanged.connect(self._enable)
         return field

@@ -1,0 +1,111 @@
+"""Fixtures of the window's tests: a window over fakes, and a check that nothing is left."""
+
+import gc
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QStandardPaths
+from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+
+from pipegui import theme
+from pipegui.document import Document, Scan
+from pipegui.jobs import Jobs
+from pipegui.main_window import MainWindow
+from tests.factories import make_scan
+from tests.gui.fakes import make_fake_parts
+
+
+@pytest.fixture(scope="session")
+def qapp(qapp: QApplication) -> QApplication:
+    QStandardPaths.setTestModeEnabled(True)
+    theme.apply_theme(qapp)
+    return qapp
+
+
+def _flush() -> None:
+    for _ in range(3):
+        QCoreApplication.processEvents()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    gc.collect()
+
+
+def _render_windows() -> set[int]:
+    """Ids of the VTK render windows that are alive; without VTK loaded there are none."""
+    import sys
+
+    core = sys.modules.get("vtkmodules.vtkRenderingCore")
+    if core is None:
+        return set()
+    return {id(o) for o in gc.get_objects() if isinstance(o, core.vtkRenderWindow)}
+
+
+@pytest.fixture(autouse=True)
+def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fail a test that leaves a window, a running thread or a VTK render window behind."""
+    if "qtbot" not in request.fixturenames:
+        yield
+        return
+    # Made before the test's own fixtures, and so looked at after they are gone.
+    app = request.getfixturevalue("qapp")
+    windows = {id(w) for w in app.topLevelWidgets()}
+    threads, render_windows = set(threading.enumerate()), _render_windows()
+    yield
+    _flush()
+    left = [w for w in app.topLevelWidgets() if id(w) not in windows]
+    running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
+    rendering = _render_windows() - render_windows
+    assert not left, f"top-level widgets left behind: {left}"
+    assert not running, f"threads left running: {running}"
+    assert not rendering, f"{len(rendering)} VTK render windows left behind"
+
+
+@pytest.fixture
+def document() -> Document:
+    """One scan, detected."""
+    cloud, result = make_scan()
+    return Document(scans=(Scan("plant.laz", cloud, result),))
+
+
+@pytest.fixture
+def make_window(
+    qtbot: QtBot, tmp_path: Path, no_leaks: None
+) -> Iterator[Callable[..., MainWindow]]:
+    """Make windows over fakes; `read` and `detect` replace pipecore's."""
+    cloud, result = make_scan()
+    windows: list[MainWindow] = []
+
+    def make(read=lambda *_: cloud, detect=lambda *_: result, parts=None) -> MainWindow:
+        stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
+        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect), stored)
+        windows.append(window)
+        window.resize(1366, 768)
+        with qtbot.waitActive(window):  # without it keys do not reach the shortcuts
+            window.show()
+            window.activateWindow()
+        return window
+
+    yield make
+    for window in windows:
+        window.close()
+        window.deleteLater()
+    windows.clear()
+    _flush()
+
+
+@pytest.fixture
+def window(make_window: Callable[..., MainWindow]) -> MainWindow:
+    """A window with nothing open."""
+    return make_window()
+
+
+@pytest.fixture
+def detected(qtbot: QtBot, window: MainWindow) -> MainWindow:
+    """A window with a scan open and detected."""
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: window.document.scan is not None)
+    window.detect()
+    qtbot.waitUntil(lambda: window.document.result is not None and not window.jobs.is_busy)
+    return window

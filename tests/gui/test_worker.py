@@ -1,0 +1,132 @@
+"""The worker: every job ends once, a cancel is answered, stale values are dropped."""
+
+import threading
+import time
+
+import pytest
+
+from pipecore.errors import ReadError
+from pipegui.worker import Cancelled, Failed, Finished, Progressed, Started, Worker
+
+ENDS = (Finished, Failed, Cancelled)
+
+
+@pytest.fixture
+def worker(qtbot):
+    worker = Worker()
+    worker.events = []
+    worker.event.connect(worker.events.append)
+    yield worker
+    assert worker.close()
+
+
+def ends(worker):
+    return [event for event in worker.events if isinstance(event, ENDS)]
+
+
+def report_until_stopped(progress):
+    """Work that never ends by itself but reports as often as pipecore promises."""
+    while True:
+        progress.update("profiles", 0.5)
+        time.sleep(0.02)
+
+
+def test_that_a_job_tells_its_start_its_stages_and_its_value(worker, qtbot):
+    def work(progress):
+        for stage in ("stacks", "profiles"):
+            progress.update(stage, 0.5)
+        return 42
+
+    job = worker.start("Detecting", work)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert worker.events[0] == Started(job, "Detecting")
+    stages = [e.stage for e in worker.events if isinstance(e, Progressed) and e.stage]
+    assert stages == ["stacks", "profiles"]
+    assert worker.events[-1] == Finished(job, 42)
+    assert not worker.is_busy
+
+
+def test_that_work_runs_beside_the_window(worker, qtbot):
+    threads = []
+    worker.start("Working", lambda _: threads.append(threading.current_thread()))
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert threads[0] is not threading.main_thread()
+
+
+def test_that_a_cancel_is_answered_within_half_a_second(worker, qtbot):
+    job = worker.start("Detecting", report_until_stopped)
+    qtbot.waitUntil(lambda: any(isinstance(e, Progressed) for e in worker.events))
+    began = time.monotonic()
+    worker.cancel()
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert time.monotonic() - began < 0.5
+    assert ends(worker) == [Cancelled(job)]
+
+
+def test_that_a_value_made_after_the_cancel_is_not_wanted(worker, qtbot):
+    go = threading.Event()
+
+    def finish_anyway(progress):
+        go.wait(5)
+        return "too late"
+
+    job = worker.start("Detecting", finish_anyway)
+    worker.cancel()
+    go.set()
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert ends(worker) == [Cancelled(job)]
+
+
+def test_that_a_new_job_ends_the_one_before_which_says_nothing_more(worker, qtbot):
+    first = worker.start("First", report_until_stopped)
+    qtbot.waitUntil(lambda: any(isinstance(e, Progressed) for e in worker.events))
+    second = worker.start("Second", lambda _: "value")
+    qtbot.waitUntil(lambda: len(ends(worker)) == 2)
+    assert ends(worker) == [Cancelled(first), Finished(second, "value")]
+    after = worker.events[worker.events.index(Started(second, "Second")) :]
+    assert not [e for e in after if isinstance(e, Progressed) and e.job == first]
+
+
+def test_that_an_expected_error_is_told_in_its_own_words(worker, qtbot):
+    def work(progress):
+        raise ReadError("“scan.laz” is damaged.")
+
+    worker.start("Reading", work)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    (failed,) = ends(worker)
+    assert failed.message == "“scan.laz” is damaged."
+    assert "ReadError" in failed.details
+
+
+def test_that_a_bug_ends_its_job_and_not_the_worker(worker, qtbot):
+    worker.start("Broken", lambda _: 1 / 0)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert "ZeroDivisionError" in ends(worker)[0].details
+    worker.start("Next", lambda _: 1)
+    qtbot.waitUntil(lambda: len(ends(worker)) == 2)
+    assert isinstance(ends(worker)[1], Finished)
+
+
+def test_that_thousands_of_reports_do_not_flood_the_window(worker, qtbot):
+    def work(progress):
+        for i in range(20_000):
+            progress.update("reading", i / 20_000)
+
+    worker.start("Reading", work)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert len(worker.events) < 200
+
+
+def test_that_time_left_is_told_once_it_can_be_known(worker, qtbot, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("pipegui.worker.time.monotonic", lambda: clock[0])
+
+    def work(progress):
+        progress.update("profiles", 0.0)
+        clock[0] += 4.0
+        progress.update("profiles", 0.25)
+
+    worker.start("Detecting", work)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    told = [e.seconds_left for e in worker.events if isinstance(e, Progressed) and e.stage]
+    assert told == [None, pytest.approx(12.0)]
