@@ -85,7 +85,10 @@ def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result:
     chainage = np.linspace(0, element.axis.length, 50)
     axes.plot(chainage, 1000 * element.radius_at(chainage), color=GREY, lw=1.0, label="fitted")
     axes.plot(
-        profiles.chainage, 1000 * profiles.semi_minor, color=BLUE, lw=0.8, label="semi-minor axis"
+        *broken_at_gaps(profiles.chainage, 1000 * profiles.semi_minor),
+        color=BLUE,
+        lw=0.8,
+        label="semi-minor axis",
     )
     axes.errorbar(
         profiles.chainage,
@@ -100,6 +103,15 @@ def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result:
     axes.set(xlabel="chainage (m)", title=f"{element.label}: radius (mm)")
     axes.legend(frameon=False, fontsize=7, ncols=3, handlelength=1.2, columnspacing=1.0)
     axes.margins(y=0.25)
+
+
+def broken_at_gaps(chainage: Array, values: Array) -> tuple[Array, Array]:
+    """Return a line's points with a nan wherever profiles are missing between two of them."""
+    if len(chainage) < 3:
+        return chainage, values
+    step = np.diff(chainage)
+    after = np.flatnonzero(step > 2.5 * np.median(step)) + 1
+    return np.insert(chainage, after, np.nan), np.insert(values, after, np.nan)
 
 
 def _drawn_depth(deformation: Deformation) -> float:
@@ -208,6 +220,7 @@ def _means_around(clock: Array, deviation: Array) -> tuple[Array, Array]:
 def _draw_centres(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
     profiles = result.profiles.of_element(element.element_id, OWN_STACK)
     _mark_extent(axes, deformation)
-    axes.plot(profiles.chainage, 1000 * profiles.centre_deviation, ".-", ms=3, lw=0.6, color=INK)
+    path = broken_at_gaps(profiles.chainage, 1000 * profiles.centre_deviation)
+    axes.plot(*path, ".-", ms=3, lw=0.6, color=INK)
     axes.set(xlabel="chainage (m)", title="distance of the centres from the axis (mm)")
     axes.set_ylim(bottom=0)

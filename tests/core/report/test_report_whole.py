@@ -13,6 +13,7 @@ import pytest
 import pipecore.report
 from pipecore.errors import CancelledError, SettingsError, WriteError
 from pipecore.report import by_verdict, result_to_dict, summarise, write_html, write_report
+from pipecore.report.figures import broken_at_gaps
 from pipecore.settings import Settings
 from pipecore.types import NO_ID, DeformationKind, Profiles, Verdict
 from tests.factories import make_scan
@@ -280,6 +281,14 @@ def test_that_every_kind_is_drawn_even_where_little_is_known(kind, tmp_path):
     )
     write_html(tmp_path / "report.html", cloud, result)
     assert "not measurable" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_that_a_line_is_not_drawn_where_profiles_are_missing():
+    chainage = np.array([0.01, 0.03, 0.05, 0.19, 0.21, 0.23])
+    x, y = broken_at_gaps(chainage, np.arange(6.0))
+    assert np.isnan(x).tolist() == np.isnan(y).tolist() == [False] * 3 + [True] + [False] * 3
+    x, y = broken_at_gaps(chainage[:3], np.arange(3.0))
+    assert np.isfinite([x, y]).all()
 
 
 def test_that_nothing_found_is_a_report_too(tmp_path):
