@@ -1,6 +1,8 @@
 """Whether there is room for a pipe: distances between surfaces of runs and blocks."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -34,11 +36,9 @@ class Body:
 
     def gap(self, other: "Body") -> float:
         """Distance between the surfaces; negative if they penetrate."""
-        # The nearest centres need not be the nearest surfaces, so look at sizes in turn.
         smallest = np.inf
-        for radius in np.unique(other.radii.round(4)):
-            same = other.radii.round(4) == radius
-            distance, _ = cKDTree(other.centres[same]).query(self.centres)
+        for radius, tree in other._trees:
+            distance, _ = tree.query(self.centres)
             smallest = min(smallest, float((distance - self.radii - radius).min()))
         return smallest
 
@@ -47,6 +47,11 @@ class Body:
         nearest = np.clip(self.centres, low, high)
         distance = np.linalg.norm(self.centres - nearest, axis=1)
         return float((distance - self.radii).min())
+
+    @cached_property
+    def _trees(self) -> list[tuple[float, Any]]:
+        """The centres by radius: the nearest centre need not have the nearest surface."""
+        return [(float(r), cKDTree(self.centres[self.radii == r])) for r in np.unique(self.radii)]
 
 
 @dataclass

@@ -129,23 +129,19 @@ class World:
         self.reflectance = np.array([m.reflectance for m in materials])
         self.mottle = np.array([m.mottle for m in materials])
 
-    def elevations(self, position: Array) -> tuple[float, float]:
-        """Lowest and highest elevation of the world's bounding sphere from `position`."""
+    def window(self, position: Array) -> tuple[Array, Array]:
+        """Lowest and highest elevation, and azimuth, of anything as seen from `position`."""
         to_middle = self._middle - position
         distance = float(np.linalg.norm(to_middle))
+        everything = np.array([-np.pi / 2, np.pi / 2]), np.array([-np.pi, np.pi])
         if distance <= 1.01 * self._reach:
-            return -np.pi / 2, np.pi / 2
-        middle, half = np.arcsin(to_middle[2] / distance), np.arcsin(1.01 * self._reach / distance)
-        return float(middle - half), float(middle + half)
-
-    def may_hit(self, position: Array, directions: Array) -> NDArray[np.bool_]:
-        """Whether rays from `position` come near the world's bounding sphere."""
-        to_middle = self._middle - position
-        along = directions @ to_middle
-        passes = np.einsum("i,i", to_middle, to_middle) - along**2
-        is_inside = np.linalg.norm(to_middle) < self._reach
-        # Room for the pointing error and the footprint.
-        return np.asarray(is_inside | ((along > 0) & (passes < (1.01 * self._reach) ** 2)))
+            return everything
+        half = np.arcsin(1.01 * self._reach / distance)
+        elevations = np.arcsin(to_middle[2] / distance) + half * np.array([-1.0, 1.0])
+        if np.abs(elevations).max() >= np.pi / 2:
+            return np.clip(elevations, *everything[0]), everything[1]
+        aside = np.arcsin(min(1.0, np.sin(half) / np.cos(elevations.mean())))
+        return elevations, np.arctan2(to_middle[1], to_middle[0]) + aside * np.array([-1.0, 1.0])
 
     def cast(self, origins: Array, directions: Array) -> tuple[Array, NDArray[np.int32], Array]:
         """Range (inf for none), part and unit normal of what each ray hits first."""
@@ -181,12 +177,6 @@ def angular_step(placement: Placement, station: Array, spacing: float) -> float:
     return float(spacing / distances[order][middle])
 
 
-def ray_grid(step: float, lowest: float, highest: float) -> tuple[Array, NDArray[np.int64]]:
-    """Rows of rays: their elevations and their numbers, evenly dense over the sphere."""
-    elevations = np.arange(lowest, min(highest, np.pi / 2), step)
-    return elevations, np.ceil(2 * np.pi * np.cos(elevations) / step).astype(np.int64)
-
-
 def _unit_rows(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
@@ -202,19 +192,28 @@ class _Station:
 
     def scan(self, step: float, stage: str, progress: Progress) -> _Points:
         """Measure along a whole grid of rays `step` apart, chunk by chunk."""
-        low, high = self.world.elevations(self.position)
-        lowest = max(low, np.deg2rad(self.scanner.lowest_elevation_deg))
-        elevations, counts = ray_grid(step, lowest, high)
-        first_azimuth = self.rng.uniform(0.0, 2 * np.pi, len(elevations))
+        elevations, first_azimuth, counts = self._rows(step)
         row_start = np.concatenate([[0], np.cumsum(counts)])
         chunks = []
         for start, stop in in_chunks(int(row_start[-1]), CHUNK, stage, progress):
             rays = np.arange(start, stop)
             row = np.searchsorted(row_start, rays, side="right") - 1
-            azimuth = first_azimuth[row] + 2 * np.pi * (rays - row_start[row]) / counts[row]
-            directions = _directions(elevations[row], azimuth)
-            chunks.append(self.measure(directions[self.world.may_hit(self.position, directions)]))
+            along = (rays - row_start[row]) * step / np.cos(elevations[row])
+            chunks.append(self.measure(_directions(elevations[row], first_azimuth[row] + along)))
         return _joined(chunks)
+
+    def _rows(self, step: float) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Elevation, first azimuth and number of rays of each row of the grid.
+
+        Rows have fewer rays towards the zenith, so that all are as dense.
+        """
+        elevation_range, azimuth_range = self.world.window(self.position)
+        lowest = max(elevation_range[0], np.deg2rad(self.scanner.lowest_elevation_deg))
+        elevations = np.arange(lowest, elevation_range[1], step)
+        width = float(np.ptp(azimuth_range))
+        counts = np.floor(width * np.cos(elevations) / step).astype(np.int64)
+        first = azimuth_range[0] + self.rng.uniform(0.0, 1.0, len(elevations)) * step
+        return elevations, first, counts
 
     def measure(self, reported: Array) -> _Points:
         """Measure along the given directions; rays without a return are left out."""

@@ -12,6 +12,8 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import tomli_w
 
 from pipecore.errors import SceneError
+from pipecore.simulate.clutter import clutter_parts
+from pipecore.simulate.placing import place_runs
 from pipecore.simulate.scene import Scene
 
 
@@ -28,7 +30,11 @@ def load_scene(path: Path) -> Scene:
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise SceneError(f"Cannot read the scene file {path}: {error}.") from error
     try:
-        return scene_from_dict(table)
+        scene = scene_from_dict(table)
+        # What cannot be built should be told with the file's name, too.
+        place_runs(scene)
+        clutter_parts(scene.clutter)
+        return scene
     except SceneError as error:
         raise SceneError(f"{path}: {error}") from error
 

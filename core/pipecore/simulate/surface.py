@@ -50,6 +50,11 @@ def facets_around(radius: float) -> int:
     return max(24, int(np.ceil(np.pi / np.sqrt(2 * CHORD_ERROR / max(radius, 1e-3)))))
 
 
+def cells_across(spec: Dent | Bulge) -> int:
+    """Number of facets across a dent; creases need more, as they do not follow the edges."""
+    return 50 if spec.shape is DentShape.SMOOTH else 80
+
+
 def _wrapped(angle: Array) -> Array:
     return np.mod(angle + np.pi, 2 * np.pi) - np.pi
 
@@ -139,7 +144,7 @@ class Surface:
         first: float = 0.0
         for spec in self.deformations:
             if isinstance(spec, Dent | Bulge):
-                n_cells = 40 if spec.shape is DentShape.SMOOTH else 80
+                n_cells = cells_across(spec)
                 n_facets = max(
                     n_facets, int(n_cells * 2 * np.pi * self.element.radius / spec.width)
                 )
@@ -148,20 +153,20 @@ class Surface:
 
     def _chainages(self) -> Array:
         element, length = self.element, self.element.axis.length
+        # Around and along add up, so chords along are held to a fifth of the error.
         if element.kind is ElementKind.SPHERE:
             half = np.arcsin(min(length / 2 / element.radius, 1.0))
-            n_rows = int(np.ceil(facets_around(element.radius) * 2 * half / (2 * np.pi)))
+            n_rows = int(np.ceil(facets_around(5 * element.radius) * half / np.pi))
             return length / 2 + element.radius * np.sin(np.linspace(-half, half, n_rows + 1))
         # Facets much longer than wide slow the ray casting down.
         stations = [np.linspace(0.0, length, int(np.ceil(length / 0.3)) + 1)]
         if isinstance(element.axis, ArcAxis):
             outer = element.axis.bend_radius + element.radius
-            # Around and along add up, so the chords along are held to a fifth of the error.
             n_chords = facets_around(5 * outer) * element.axis.bend_angle / (2 * np.pi)
             stations.append(np.linspace(0.0, length, int(np.ceil(n_chords)) + 1))
         for spec in self.deformations:
             if isinstance(spec, Dent | Bulge):
-                n_cells = 40 if spec.shape is DentShape.SMOOTH else 80
+                n_cells = cells_across(spec)
                 half = spec.length / 2
                 stations.append(spec.chainage + np.linspace(-half, half, n_cells + 1))
             elif isinstance(spec, Ovality):
