@@ -73,7 +73,7 @@ class ToolBar(QToolBar):
 
     def _tell_colour(self) -> None:
         if not self._applying:
-            self.colour_chosen.emit(self.colour.currentData())
+            self.colour_chosen.emit(ColourBy(self.colour.currentData()))
 
     def _tell_limit(self, limit: float) -> None:
         if not self._applying:

@@ -175,7 +175,7 @@ class StacksPanel(QWidget):
 
     def _tell_preset(self) -> None:
         if not self._applying:
-            self.preset_chosen.emit(self.preset.currentData())
+            self.preset_chosen.emit(DirectionPreset(self.preset.currentData()))
 
     def _tell_shown(self, item: QTreeWidgetItem, column: int) -> None:
         if self._applying or column != NAME:

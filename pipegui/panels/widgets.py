@@ -1,6 +1,6 @@
 """Small widgets that several panels use."""
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QWidget
 
@@ -60,7 +60,10 @@ class QuietSpinBox(QDoubleSpinBox):
 
 
 class QuietComboBox(QComboBox):
-    """A choice that does not change by scrolling past it."""
+    """A choice that does not change by scrolling past it, and can be typed into.
+
+    Qt turns a `StrEnum` among an item's data into a plain string.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -72,3 +75,10 @@ class QuietComboBox(QComboBox):
             super().wheelEvent(event)
         else:
             event.ignore()
+
+    def event(self, event: QEvent) -> bool:
+        """Take letters for the choice, before they become the window's shortcuts."""
+        if event.type() == QEvent.Type.ShortcutOverride and event.text().isprintable():  # type: ignore[attr-defined]
+            event.accept()
+            return True
+        return super().event(event)

@@ -14,7 +14,7 @@ from pipegui import theme
 from pipegui.document import Document, Scan
 from pipegui.jobs import Jobs
 from pipegui.main_window import MainWindow
-from tests.factories import make_scan
+from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_parts
 
 
@@ -65,7 +65,7 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
 @pytest.fixture
 def document() -> Document:
     """One scan, detected."""
-    cloud, result = make_scan()
+    cloud, result = make_cloud(), make_result()
     return Document(scans=(Scan("plant.laz", cloud, result),))
 
 
@@ -74,7 +74,7 @@ def make_window(
     qtbot: QtBot, tmp_path: Path, no_leaks: None
 ) -> Iterator[Callable[..., MainWindow]]:
     """Make windows over fakes; `read` and `detect` replace pipecore's."""
-    cloud, result = make_scan()
+    cloud, result = make_cloud(), make_result()
     windows: list[MainWindow] = []
 
     def make(read=lambda *_: cloud, detect=lambda *_: result, parts=None) -> MainWindow:

@@ -1,0 +1,472 @@
+"""Whole tasks in a real window: open, detect, select, undo, export, close."""
+
+import time
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QPushButton
+
+from pipecore.errors import CancelledError, ReadError
+from pipecore.types import NO_ID
+from pipegui.actions import SPECS
+from pipegui.document import ColourBy, ProfileKey, Selection
+from tests.factories import make_cloud, make_result
+
+LEFT = Qt.MouseButton.LeftButton
+CTRL = Qt.KeyboardModifier.ControlModifier
+
+
+def key(qtbot, window, *args):
+    qtbot.keyClick(window, *args)
+
+
+def press(qtbot, window, action):
+    """Click the button of an action in the tool bar."""
+    qtbot.mouseClick(window.tool_bar.widgetForAction(window.actions_[action]), LEFT)
+
+
+def everywhere(window):
+    """What each part says is selected, as (element, deformation)."""
+    table_row = window.panels.table.view.currentIndex()
+    row = window.panels.table.proxy.mapToSource(table_row).row()
+    chosen = window.panels.table.view.selectionModel().hasSelection()
+    in_table = window.panels.table.model.deformation(row).deformation_id if chosen else NO_ID
+    tree = window.panels.tree
+    _, kind, item_id = tree.model.what(tree.view.currentIndex())
+    parts = window.parts
+    return {
+        "scene": parts.scene.state.selection.element_id,
+        "plot": getattr(parts.radius_plot.state.element, "element_id", NO_ID),
+        "map": getattr(parts.map.state.element, "element_id", NO_ID),
+        "section": getattr(parts.section.state.element, "element_id", NO_ID),
+        "properties": window.panels.properties.list.topLevelItem(0).text(0),
+        "tree": (kind.value, item_id),
+        "table": in_table,
+    }
+
+
+# First steps
+
+
+def test_that_an_empty_window_offers_to_open_and_nothing_that_makes_no_sense(window):
+    assert window.panels.welcome.isVisible()
+    assert window.panels.welcome.open_button.isEnabled()
+    enabled = {s.name for s in SPECS if window.actions_[s.name].isEnabled()}
+    assert {"open", "demo", "quit"} <= enabled
+    assert enabled.isdisjoint({"detect", "cancel", "undo", "export_deformations", "fit", "go_up"})
+
+
+def test_that_after_opening_the_cloud_is_shown_and_detect_is_lit(window, qtbot):
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: window.document.scan is not None and not window.jobs.is_busy)
+    assert window.parts.scene.isVisible()
+    assert window.parts.scene.state.cloud is make_cloud()
+    assert window.actions_["detect"].isEnabled()
+    assert window.windowTitle() == "plant.laz – PipeGUI"
+    assert "20 k points" in window.status.scan.text()
+
+
+def test_that_detecting_ends_with_a_summary_and_the_worst_dent_in_view(window, qtbot):
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    press(qtbot, window, "detect")
+    qtbot.waitUntil(lambda: window.document.result is not None)
+    message = window.panels.message.text.text()
+    assert message.startswith("5 pipes in 3 runs, 4 deformations, 1 to reject")
+    assert everywhere(window) == {
+        "scene": 2,
+        "plot": 2,
+        "map": 2,
+        "section": 2,
+        "properties": "Dent 1",
+        "tree": ("deformation", 1),
+        "table": 1,
+    }
+    assert window.parts.scene.state.view.colour_by is ColourBy.DEVIATION
+
+
+def test_that_a_dropped_file_is_opened(window, qtbot, tmp_path):
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(tmp_path / "a.laz"))])
+    where, buttons = window.rect().center(), LEFT
+    none = Qt.KeyboardModifier.NoModifier
+    enter = QDragEnterEvent(where, Qt.DropAction.CopyAction, mime, buttons, none)
+    QApplication.sendEvent(window, enter)
+    assert enter.isAccepted()
+    drop = QDropEvent(where.toPointF(), Qt.DropAction.CopyAction, mime, buttons, none)
+    QApplication.sendEvent(window, drop)
+    qtbot.waitUntil(lambda: window.document.scan is not None and not window.jobs.is_busy)
+    assert window.document.scan.name == "a.laz"
+
+
+def test_that_several_files_become_several_scans_of_which_the_tree_chooses(window, qtbot):
+    window.open_files([Path("a.laz"), Path("b.laz")])
+    qtbot.waitUntil(lambda: len(window.document.scans) == 2 and not window.jobs.is_busy)
+    assert window.document.active == 1
+    tree = window.panels.tree
+    rect = tree.view.visualRect(tree.model.index(0, 0))
+    qtbot.mouseClick(tree.view.viewport(), LEFT, pos=rect.center())
+    assert window.document.active == 0
+    assert window.windowTitle().startswith("a.laz")
+
+
+# One selection everywhere
+
+
+@pytest.mark.parametrize("by", ["scene", "tree", "table", "map", "label"])
+def test_that_a_choice_anywhere_is_shown_everywhere(detected, qtbot, by):
+    window, parts = detected, detected.parts
+    dent = make_result().deformation(4)
+    if by == "scene":
+        parts.scene.picked.emit(int((make_result().element_id == 9).argmax()))
+        qtbot.waitUntil(lambda: window.document.selection.element_id == 9)
+        parts.map.deformation_clicked.emit(4)
+    elif by == "tree":
+        tree = window.panels.tree
+        index = next(
+            tree.model.createIndex(n.row, 0, n.number)
+            for n in tree.model._nodes
+            if n.text == "Dent 4 · Pipe 9"
+        )
+        tree.view.scrollTo(index)
+        rect = tree.view.visualRect(index)
+        qtbot.mouseClick(tree.view.viewport(), LEFT, pos=rect.center())
+    elif by == "table":
+        view = window.panels.table.view
+        index = window.panels.table.proxy.index(2, 2)
+        qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(index).center())
+    elif by == "map":
+        parts.scene.picked.emit(int((make_result().element_id == 9).argmax()))
+        parts.map.spot_clicked.emit(dent.chainage, dent.clock)
+    else:
+        parts.scene.deformation_picked.emit(4)
+    assert everywhere(window) == {
+        "scene": 9,
+        "plot": 9,
+        "map": 9,
+        "section": 9,
+        "properties": "Dent 4",
+        "tree": ("deformation", 4),
+        "table": 4,
+    }
+
+
+def test_that_a_plot_point_selects_its_profile_and_arrows_step_on(detected):
+    detected.parts.radius_plot.profile_clicked.emit(0, 40)
+    assert detected.document.selection == Selection(1, 2, 1, ProfileKey(0, 40))
+    detected.parts.section.step_requested.emit(1)
+    assert detected.parts.radius_plot.state.selected_index == 41
+    assert detected.parts.section.state.profile.profile_index[0] == 41
+
+
+def test_that_escape_goes_up(detected, qtbot):
+    detected.parts.radius_plot.profile_clicked.emit(0, 40)
+    seen = []
+    for _ in range(4):
+        key(qtbot, detected, Qt.Key.Key_Escape)
+        seen.append(detected.document.selection)
+    assert seen == [Selection(1, 2, 1), Selection(1, 2), Selection(1), Selection()]
+
+
+def test_that_n_goes_through_the_deformations(detected, qtbot):
+    key(qtbot, detected, Qt.Key.Key_N)
+    assert detected.document.selection.deformation_id == 3
+
+
+def test_that_hovering_shows_world_coordinates_and_what_is_there(detected):
+    index = int((make_result().element_id == 2).argmax())
+    detected.parts.scene.hovered.emit(index)
+    east = make_cloud().world(make_cloud().xyz[index])[0]
+    text = detected.status.cursor_position.text()
+    assert f"E 432\u2009{east - 432_000:.3f}" in text
+    detected.parts.scene.hovered.emit(-1)
+    assert detected.status.cursor_position.text() == ""
+
+
+# Looking
+
+
+def test_that_colours_and_limits_reach_the_scene(detected, qtbot):
+    bar = detected.tool_bar
+    assert bar.limit.isVisible()
+    bar.limit.setFocus()
+    bar.limit.selectAll()
+    qtbot.keyClicks(bar.limit, "5")
+    qtbot.keyClick(bar.limit, Qt.Key.Key_Return)
+    assert detected.parts.scene.state.view.deviation_limit_mm == 5
+    assert detected.parts.map.state.limit_mm == 5
+    qtbot.keyClicks(bar.colour, "Height")
+    assert detected.parts.scene.state.view.colour_by is ColourBy.HEIGHT
+    qtbot.waitUntil(lambda: not bar.limit.isVisible())
+    # The letters were meant for the choice, not as keys of the window.
+    assert detected.document.view.hidden_elements == frozenset()
+
+
+def test_that_showing_a_stack_colours_its_profiles_and_ticks_only_one(detected):
+    stacks = detected.panels.stacks.list
+    stacks.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
+    stacks.topLevelItem(2).setCheckState(0, Qt.CheckState.Checked)
+    view = detected.parts.scene.state.view
+    assert (view.colour_by, view.shown_stack) == (ColourBy.PROFILE, 3)
+    ticked = [stacks.topLevelItem(i).checkState(0) == Qt.CheckState.Checked for i in range(3)]
+    assert ticked == [False, False, True]
+    stacks.topLevelItem(2).setCheckState(0, Qt.CheckState.Unchecked)
+    assert detected.parts.scene.state.view.shown_stack == NO_ID
+
+
+def test_that_keys_and_menus_change_the_view(detected, qtbot):
+    key(qtbot, detected, Qt.Key.Key_A)
+    assert not detected.parts.scene.state.view.show_axes
+    assert not detected.actions_["show_axes"].isChecked()
+    key(qtbot, detected, Qt.Key.Key_7)
+    key(qtbot, detected, Qt.Key.Key_F)
+    assert detected.parts.scene.standard_views == ["top", "fit"]
+
+
+# Undo
+
+
+def test_that_hiding_and_settings_are_undone_in_turn(detected, qtbot):
+    detected.panels.tree.visibility_changed.emit((1, 2), True)
+    detected.panels.settings.changed.emit("elements.min_radius_mm", 40.0)
+    assert detected.actions_["undo"].text() == "Undo change settings"
+    key(qtbot, detected, Qt.Key.Key_Z, CTRL)
+    assert detected.document.settings.elements.min_radius_mm == 15.0
+    assert detected.document.view.hidden_elements == {1, 2}
+    key(qtbot, detected, Qt.Key.Key_Z, CTRL)
+    assert detected.document.view.hidden_elements == frozenset()
+    key(qtbot, detected, Qt.Key.Key_Z, CTRL | Qt.KeyboardModifier.ShiftModifier)
+    assert detected.parts.scene.state.view.hidden_elements == {1, 2}
+
+
+def test_that_the_selection_survives_detecting_again(detected, qtbot):
+    detected.panels.table.chosen.emit(3)
+    detected.parts.radius_plot.profile_clicked.emit(0, 12)
+    before = detected.document.selection
+    detected.detect()
+    qtbot.waitUntil(lambda: not detected.jobs.is_busy)
+    assert detected.document.selection == before
+
+
+# Work and its ends
+
+
+def busy_detect(cloud, settings, progress):
+    while True:
+        progress.update("ellipses", 0.62)
+        time.sleep(0.02)
+
+
+def test_that_a_detection_can_be_cancelled_and_leaves_everything_as_it_was(make_window, qtbot):
+    window = make_window(detect=busy_detect)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    before = window.document
+    press(qtbot, window, "detect")
+    qtbot.waitUntil(lambda: "ellipses 62 %" in window.status.job.text())
+    assert not window.actions_["detect"].isEnabled()
+    began = time.monotonic()
+    qtbot.mouseClick(window.status.cancel, LEFT)
+    assert window.status.job.text() == "Cancelling…"
+    qtbot.waitUntil(lambda: not window.jobs.is_busy)
+    assert time.monotonic() - began < 0.5
+    assert window.document is before
+    assert not window.status.bar.isVisible()
+    assert window.panels.message.text.text() == "Detecting was cancelled."
+
+
+def test_that_the_window_answers_while_it_detects(make_window, qtbot):
+    window = make_window(detect=busy_detect)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    key(qtbot, window, Qt.Key.Key_A)
+    assert not window.document.view.show_axes
+    window.close()
+
+
+def test_that_a_file_that_cannot_be_read_is_told_with_details_to_copy(make_window, qtbot):
+    def read(path, settings, progress):
+        raise ReadError(f"“{path.name}” is damaged: it ends after 12 of 100 points.")
+
+    window = make_window(read=read)
+    window.open_files([Path("broken.laz")])
+    qtbot.waitUntil(window.panels.message.isVisible)
+    assert "broken.laz" in window.panels.message.text.text()
+    qtbot.mouseClick(window.panels.message.details_button, LEFT)
+    dialog = window.findChild(QDialog, "details")
+    assert dialog.isVisible()
+    assert not dialog.isModal()
+    copy = next(b for b in dialog.findChildren(QPushButton) if "Copy" in b.text().replace("&", ""))
+    qtbot.mouseClick(copy, LEFT)
+    assert "ReadError" in QApplication.clipboard().text()
+    dialog.close()
+
+
+def test_that_a_bug_in_the_detection_keeps_scan_and_result(detected, qtbot):
+    def broken(cloud, settings, progress):
+        raise IndexError("bins")
+
+    detected.jobs._detect = broken
+    result = detected.document.result
+    detected.detect()
+    qtbot.waitUntil(lambda: not detected.jobs.is_busy)
+    assert "Your scans and earlier results are safe." in detected.panels.message.text.text()
+    assert detected.document.result is result
+
+
+def test_that_requests_wait_for_each_other(make_window, qtbot):
+    order = []
+
+    def read(path, settings, progress):
+        order.append(path.name)
+        progress.update("reading", 0.5)
+        return make_cloud()
+
+    window = make_window(read=read)
+    window.open_files([Path("a.laz"), Path("b.laz"), Path("c.laz")])
+    qtbot.waitUntil(lambda: len(window.document.scans) == 3)
+    assert order == ["a.laz", "b.laz", "c.laz"]
+
+
+def test_that_cancel_forgets_what_waits(make_window, qtbot):
+    def read(path, settings, progress):
+        while True:
+            progress.update("reading", 0.1)
+            time.sleep(0.01)
+
+    window = make_window(read=read)
+    window.open_files([Path("a.laz"), Path("b.laz")])
+    window.jobs.cancel()
+    qtbot.waitUntil(lambda: not window.jobs.is_busy)
+    assert window.document.scans == ()
+
+
+def test_that_closing_while_working_stops_the_work(make_window, qtbot):
+    stopped = []
+
+    def detect(cloud, settings, progress):
+        try:
+            busy_detect(cloud, settings, progress)
+        except CancelledError:
+            stopped.append(True)
+            raise
+
+    window = make_window(detect=detect)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    qtbot.waitUntil(lambda: "ellipses" in window.status.job.text())
+    window.close()
+    assert stopped == [True]
+
+
+def test_that_a_setting_that_does_not_fit_is_told_and_shown_as_it_was(detected):
+    detected.panels.settings.changed.emit("deformation.min_depth_mm", -1.0)
+    assert detected.panels.message.isVisible()
+    assert detected.document.settings.deformation.min_depth_mm == 3.0
+
+
+# Files
+
+
+@pytest.mark.parametrize(
+    ("table", "n_rows"),
+    [("deformations", 4), ("elements", 9), ("profiles", len(make_result().profiles))],
+)
+def test_that_tables_are_exported_whole(detected, tmp_path, monkeypatch, table, n_rows):
+    target = tmp_path / f"{table}.csv"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: (str(target), ""))
+    detected.actions_[f"export_{table}"].trigger()
+    lines = target.read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 1 + n_rows
+    assert "element_id" in lines[0]
+    assert str(target) in detected.panels.message.text.text()
+
+
+def test_that_a_table_that_cannot_be_written_is_told(detected, tmp_path, monkeypatch):
+    target = tmp_path / "missing" / "deformations.csv"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: (str(target), ""))
+    detected.actions_["export_deformations"].trigger()
+    assert "was not saved" in detected.panels.message.text.text()
+
+
+def test_that_the_report_folder_is_written_beside_the_window_and_never_over_another(
+    detected, qtbot, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(QFileDialog, "getExistingDirectory", lambda *a: str(tmp_path))
+    for name in ("plant report", "plant report 2"):
+        detected.actions_["export_report"].trigger()
+        qtbot.waitUntil(lambda: not detected.jobs.is_busy, timeout=60_000)
+        assert (tmp_path / name / "deformations.csv").is_file()
+        assert (tmp_path / name / "report.html").is_file()
+
+
+def test_that_settings_are_saved_and_loaded(detected, tmp_path, monkeypatch):
+    target = tmp_path / "mine.toml"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: (str(target), ""))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *a: (str(target), ""))
+    detected.panels.settings.changed.emit("elements.min_radius_mm", 40.0)
+    detected.actions_["save_settings"].trigger()
+    detected.panels.settings.changed.emit("elements.min_radius_mm", 50.0)
+    detected.actions_["load_settings"].trigger()
+    assert detected.document.settings.elements.min_radius_mm == 40.0
+
+
+def test_that_opened_files_are_remembered(make_window, qtbot, tmp_path):
+    from dataclasses import replace
+
+    path = tmp_path / "plant.laz"
+    path.touch()
+    window = make_window(read=lambda p, s, g: replace(make_cloud(), source=p))
+    window.open_files([path])
+    qtbot.waitUntil(lambda: window.document.scan is not None and not window.jobs.is_busy)
+    window.close()
+    again = make_window(read=lambda p, s, g: replace(make_cloud(), source=p))
+    recent = again.menu_actions._recent_menu.actions()
+    assert [a.text() for a in recent] == ["plant.laz"]
+    recent[0].trigger()
+    qtbot.waitUntil(lambda: again.document.scan is not None)
+
+
+# The window itself
+
+
+def test_that_the_layout_comes_back_as_it_was_left(make_window, qtbot):
+    window = make_window()
+    window.panels.docks["Properties"].hide()
+    window.close()
+    again = make_window()
+    assert not again.panels.docks["Properties"].isVisible()
+    assert again.panels.docks["Project"].isVisible()
+
+
+def test_that_no_key_is_given_twice():
+    keys = [s.shortcut for s in SPECS if s.shortcut]
+    assert len(keys) == len(set(keys))
+
+
+def test_that_every_button_and_field_says_what_it_is(detected):
+    """Names for screen readers: an icon alone is not one."""
+    from PySide6.QtWidgets import QAbstractSpinBox, QComboBox, QToolButton
+
+    nameless = [
+        w
+        for kind in (QToolButton, QComboBox, QAbstractSpinBox)
+        for w in detected.findChildren(kind)
+        if w.isVisible()
+        and not w.objectName().startswith("qt_")
+        and not (w.accessibleName() or w.toolTip() or getattr(w, "text", str)())
+    ]
+    assert nameless == []
+
+
+def test_that_all_is_usable_at_1366_by_768(detected):
+    assert detected.width() <= 1366
+    assert detected.height() <= 768
+    assert detected.parts.scene.width() > 500
+    assert detected.parts.scene.height() > 300
+    verdict = detected.panels.table.view.visualRect(detected.panels.table.proxy.index(0, 10))
+    assert detected.panels.table.view.viewport().rect().contains(verdict)
