@@ -17,6 +17,6 @@ if ! .venv/bin/python -c 'import pip' 2>/dev/null; then
     .venv/bin/python -m ensurepip >/dev/null
 fi
 
-echo "Installing the Python packages of requirements.lock (over 1 GB the first time) …"
+echo "Installing the Python packages of requirements.lock (some minutes the first time) …"
 .venv/bin/python -m pip install --quiet --no-deps --require-hashes -r requirements.lock
 .venv/bin/python -m pip install --quiet --no-deps --no-build-isolation --no-index --editable .
