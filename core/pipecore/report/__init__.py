@@ -72,7 +72,7 @@ def write_report(
         write_elements_csv(folder / "elements.csv", result)
         write_deformations_csv(folder / "deformations.csv", result)
         write_profiles_csv(folder / "profiles.csv", result, progress)
-        write_result_json(folder / "result.json", result)
+        write_result_json(folder / "result.json", result, progress)
         write_html(folder / "report.html", cloud, result, progress)
         write_segments(folder / "segments.laz", cloud, result, progress)
 

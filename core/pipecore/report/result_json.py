@@ -21,6 +21,7 @@ import numpy as np
 
 import pipecore
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.progress import NoProgress, Progress
 from pipecore.types import Result
 
 FORMAT = "pipecore result"
@@ -51,13 +52,25 @@ def result_to_dict(result: Result) -> dict[str, Any]:
     }
 
 
-def write_result_json(path: Path, result: Result) -> None:
-    """Write ``result.json``: one line a key, so that a person can look into it too."""
-    lines = (
-        f"{json.dumps(key)}: {json.dumps(value, allow_nan=False, ensure_ascii=False)}"
-        for key, value in result_to_dict(result).items()
-    )
-    path.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+def write_result_json(path: Path, result: Result, progress: Progress | None = None) -> None:
+    """Write ``result.json``, a line for each key, so that a person can look into it too."""
+    progress = progress or NoProgress()
+    with path.open("w", encoding="utf-8") as file:
+        for i, (key, value) in enumerate(result_to_dict(result).items()):
+            file.write(",\n" if i else "{\n")
+            if not isinstance(value, dict):
+                file.write(f"{_dumped(key)}: {_dumped(value)}")
+                continue
+            file.write(f"{_dumped(key)}: {{")
+            for j, (name, item) in enumerate(value.items()):
+                progress.update("writing result", j / len(value))
+                file.write(f"{',' if j else ''}\n {_dumped(name)}: {_dumped(item)}")
+            file.write("}")
+        file.write("\n}\n")
+
+
+def _dumped(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
 
 def _plain(value: Any) -> Any:
@@ -66,7 +79,9 @@ def _plain(value: Any) -> Any:
         plain = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
         return _AXIS_KIND.get(type(value), {}) | plain
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        plain_numbers = np.asarray(value).astype(object)
+        plain_numbers[~np.isfinite(value)] = None
+        return plain_numbers.tolist()
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

@@ -219,7 +219,11 @@ def _profile_rows(result: Result, progress: Progress) -> Iterator[tuple[str, ...
 
 def _profile_columns(p: Profiles, place: FileCoordinates) -> list[list[str]]:
     def column(values: Array, scale: float, decimals: int) -> list[str]:
-        return [cell(v, decimals) for v in (scale * values).tolist()]
+        # Adding zero takes the sign off a zero.
+        rounded = np.round(scale * values, decimals) + 0.0
+        text = np.char.mod(f"%.{decimals}f", rounded)
+        text[~np.isfinite(rounded)] = ""
+        return [str(t) for t in text.tolist()]
 
     def whole(values: NDArray[np.int32]) -> list[str]:
         return [str(v) for v in values.tolist()]
