@@ -5,8 +5,8 @@ PYTHON := $(VENV)/bin/python
 STAMP := $(VENV)/.installed
 DEMO := resources/demo/demo.laz
 
-# A window needs a display; where there is none, a virtual one is made for the command.
-ifeq ($(DISPLAY)$(WAYLAND_DISPLAY),)
+# A window needs a display; where Linux has none, a virtual one is made for the command.
+ifeq ($(shell uname -s)$(DISPLAY)$(WAYLAND_DISPLAY),Linux)
 WINDOWED := xvfb-run -a -s "-screen 0 1600x1000x24"
 endif
 

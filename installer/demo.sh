@@ -7,7 +7,7 @@ scan=$1 report=$2
 
 mkdir -p "$(dirname "$report")"
 .venv/bin/pipecore detect "$scan" -o "$report" --overwrite
-if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+if [ "$(uname -s)${DISPLAY:-}${WAYLAND_DISPLAY:-}" != Linux ]; then
     echo "Opening $scan in PipeGUI …"
     .venv/bin/pipegui "$scan" --detect
 else
