@@ -255,16 +255,17 @@ def covered_arc(angles, max_gap):
     return 2.0 * math.pi - uncovered
 
 
-N_FIT_COLUMNS = 13
-"""Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points; slope; λ1, λ2; share of radial normals."""
+N_FIT_COLUMNS = 16
+"""Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points; λ1, λ2 of the normals;
+share of radial normals; where the normals meet u, v, d, and the points' distance from there."""
 
 
 @njit(cache=True, nogil=True)
 def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits):
     """Fit a cylinder cut to each of the curves start … stop; write `N_FIT_COLUMNS` values.
 
-    The slope is the mean of n·a with n outward: 0 on a cylinder, constant on a cone,
-    proportional to the distance from the centre on a sphere.
+    Where the normals meet is the centre of the section on a cylinder, and the centre of
+    the sphere on a sphere, wherever it was cut.
     """
     for c in range(start, stop):
         a, b = curve_starts[c], curve_starts[c + 1]
@@ -286,7 +287,8 @@ def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits)
         cx, cy, r = geometric_circle(x, y, cx, cy, r, 4.0 * tolerance, weights, 8)
         if not r > 0.0:
             continue
-        total = ss = slope = 0.0
+        total = ss = 0.0
+        xx = xy = xz = yy = yz = zz = bx = by = bz = 0.0
         n_in = n_radial = 0
         angles = np.empty(n)
         for k in range(n):
@@ -300,8 +302,18 @@ def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits)
             ss += weights[k] * (d - r) ** 2
             radial = (dx * mx[k] + dy * my[k]) / d
             n_radial += abs(radial) > 0.9
-            along = vectors[k, 0] * au + vectors[k, 1] * av + vectors[k, 2] * ad
-            slope += along if radial > 0.0 else -along
+            # Normal equations of the point nearest to all normals' lines.
+            nu, nv, nd = vectors[k, 0], vectors[k, 1], vectors[k, 2]
+            pn = points[k, 0] * nu + points[k, 1] * nv
+            xx += 1.0 - nu * nu
+            xy -= nu * nv
+            xz -= nu * nd
+            yy += 1.0 - nv * nv
+            yz -= nv * nd
+            zz += 1.0 - nd * nd
+            bx += points[k, 0] - pn * nu
+            by += points[k, 1] - pn * nv
+            bz -= pn * nd
         if n_in < 5:
             continue
         sorted_angles = np.sort(angles[:n_in])
@@ -315,6 +327,20 @@ def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits)
         fits[c, 6] = math.sqrt(ss / total)
         fits[c, 7] = arc
         fits[c, 8] = n_in
-        fits[c, 9] = slope / n_in
-        fits[c, 10], fits[c, 11] = l1, l2
-        fits[c, 12] = n_radial / n
+        fits[c, 9], fits[c, 10] = l1, l2
+        fits[c, 11] = n_radial / n
+        det = (
+            xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+        )
+        if det > 0.0:
+            mu = (bx * (yy * zz - yz * yz) - xy * (by * zz - yz * bz) + xz * (by * yz - yy * bz)) / det
+            mv = (xx * (by * zz - yz * bz) - bx * (xy * zz - yz * xz) + xz * (xy * bz - by * xz)) / det
+            md = (xx * (yy * bz - by * yz) - xy * (xy * bz - by * xz) + bx * (xy * yz - yy * xz)) / det
+            distance = 0.0
+            for k in range(n):
+                if weights[k] >= 0.1:
+                    distance += math.sqrt(
+                        (points[k, 0] - mu) ** 2 + (points[k, 1] - mv) ** 2 + md * md
+                    )
+            fits[c, 12], fits[c, 13], fits[c, 14] = mu, mv, md
+            fits[c, 15] = distance / n_in

@@ -46,7 +46,7 @@ def on_line(
     if not expected > 0.0 or abs(r - expected) > max_change * expected + 2.0 * sd:
         return False
     off2 = qx * qx + qy * qy + qz * qz - s * s
-    limit = max_offset * expected + 2.0 * min(sd, 0.05 * expected)
+    limit = max_offset * expected + 2.0 * min(sd, 0.03 * expected)
     return off2 <= limit * limit
 
 
@@ -177,7 +177,7 @@ def on_arc(
     h = qx * nx + qy * ny + qz * nz
     rx, ry, rz = qx - h * nx, qy - h * ny, qz - h * nz
     rho = math.sqrt(rx * rx + ry * ry + rz * rz)
-    limit = max_offset * radius + 2.0 * min(sd, 0.05 * radius)
+    limit = max_offset * radius + 2.0 * min(sd, 0.03 * radius)
     if (rho - bend) ** 2 + h * h > limit * limit or rho == 0.0:
         return False
     tx, ty, tz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx

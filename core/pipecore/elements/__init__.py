@@ -11,11 +11,10 @@ from pipecore.elements.pieces import Piece, find_pieces
 from pipecore.elements.refine import Fitted, refine_piece
 from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
-from pipecore.ellipses import Ellipses
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
-from pipecore.types import NO_ID, Element, ElementKind
+from pipecore.types import Element, ElementKind
 
 __all__ = ["BuiltElements", "NearbyPoints", "build_elements", "find_pieces"]
 
@@ -26,6 +25,8 @@ MIN_COVERAGE = 0.5
 MIN_ARC = np.deg2rad(75.0)
 MAX_RADIUS_SD = 0.04
 """Largest standard deviation of a radius, as a share of it."""
+MAX_MISFIT = 0.015
+"""Largest root mean square by which a section leaves circle and oval, as a share of the radius."""
 FLANGE_RATIO = (1.12, 2.8)
 FLANGE_LENGTH = 0.9
 """A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
@@ -60,11 +61,11 @@ def build_elements(
     """
     fitted = refine_pieces(pieces, nearby, settings, progress)
     axes = [f.axis for f in fitted]
-    spans = [Span(f.axis, (f.radius, f.radius_end)) for f in fitted]
+    spans = [Span(f.axis, f.radii) for f in fitted]
     links = []
     for i, end_i, j, end_j in meeting_ends(spans):
         links.append((i, j))
-        axes[i], axes[j] = _trimmed(axes[i], end_i, axes[j], end_j, fitted[i].radius)
+        axes[i], axes[j] = _trimmed(axes[i], end_i, axes[j], end_j, fitted[i].fit.model.radius)
     kinds = [_kind(f) for f in fitted]
     for i, j in flanges(fitted):
         kinds[i] = ElementKind.FLANGE
@@ -104,7 +105,9 @@ def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) 
         return False
     if isinstance(model, SphereSurface):
         return len(found.own) >= 60
-    if found.coverage < MIN_COVERAGE or found.arc < MIN_ARC:
+    if found.extent.coverage < MIN_COVERAGE or found.extent.arc < MIN_ARC:
+        return False
+    if found.misfit > MAX_MISFIT * radius + 0.0005:
         return False
     if isinstance(model, ArcSurface):
         return model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
@@ -142,18 +145,19 @@ def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
     ]
     found = []
     for i, disc in pipes:
-        if disc.axis.length > FLANGE_LENGTH * disc.radius:
+        if disc.axis.length > FLANGE_LENGTH * disc.fit.model.radius:
             continue
         for j, pipe in pipes:
-            ratio = disc.radius / pipe.radius
+            ratio = disc.fit.model.radius / pipe.fit.model.radius
             if i == j or not FLANGE_RATIO[0] < ratio < FLANGE_RATIO[1]:
                 continue
-            if pipe.axis.length < 1.0 * pipe.radius:
+            if pipe.axis.length < pipe.fit.model.radius:
                 continue
             chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
             turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
-            near = -2 * pipe.radius < chainage[0] < pipe.axis.length + 2 * pipe.radius
-            if near and rho[0] < 0.15 * pipe.radius and turn > np.cos(np.deg2rad(12.0)):
+            reach = 2 * pipe.fit.model.radius
+            near = -reach < chainage[0] < pipe.axis.length + reach
+            if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):
                 found.append((i, j))
                 break
     return found
@@ -181,8 +185,8 @@ def _numbered(
         found = fitted[i]
         model = found.fit.model
         run_id.setdefault(int(run[i]), len(run_id) + 1)
-        moved = replace(found, axis=axes[i])
-        size = nominal_size(2 * found.radius, settings.catalogue, settings.size_tolerance_pct)
+        start_radius, end_radius = replace(found, axis=axes[i]).radii
+        size = nominal_size(2 * start_radius, settings.catalogue, settings.size_tolerance_pct)
         is_sized = kinds[i] in (ElementKind.CYLINDER, ElementKind.TORUS)
         shift = float(found.axis.pipe_coordinates(axes[i].start[None])[0][0])
         elements.append(
@@ -191,16 +195,16 @@ def _numbered(
                 run_id=run_id[int(run[i])],
                 kind=kinds[i],
                 axis=axes[i],
-                radius=moved.radius,
+                radius=start_radius,
                 radius_sd=found.fit.radius_sd,
-                radius_end=moved.radius_end,
+                radius_end=end_radius,
                 centre=np.full(3, np.nan) if isinstance(model, LineSurface) else model.centre,
                 n_points=0,
                 n_profiles=0,
-                arc=found.arc,
+                arc=found.extent.arc,
                 rms=found.fit.sigma,
                 nominal=size if is_sized else None,
-                gaps=tuple((a - shift, b - shift) for a, b in found.gaps),
+                gaps=tuple((a - shift, b - shift) for a, b in found.extent.gaps),
             )
         )
         own.append(found.own)

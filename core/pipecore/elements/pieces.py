@@ -27,8 +27,13 @@ MAX_OFFSET = 0.06
 """A centre is off the axis by less than this share of the radius."""
 MAX_CHANGE = 0.06
 """A radius is off the pattern by less than this share."""
+SAME_RADIUS = 0.025
+"""Radii of one piece differ from its pattern by less than this share (and twice their sd)."""
 MIN_ELLIPSES = 5
-LONG_PIECE = 1.6
+MIN_SPHERE = 8
+"""Ellipses cut off its centre that make a sphere."""
+MIN_TAPER = 0.04
+LONG_PIECE = 2.5
 """Straight pieces of this many radii come first: shorter ones may be part of a bend."""
 SHORT_PIECE = 0.5
 
@@ -93,9 +98,9 @@ def _explain_chain(
             members = np.setdiff1d(members, piece.ellipses)
 
     take(_take_lines(ellipses, members, width, LONG_PIECE))
+    take(_take_lines(ellipses, members, width, SHORT_PIECE, is_tapered=True))
     for group in _reconnected(ellipses, members, width, progress):
         take(_take_arcs(ellipses, group))
-    take(_take_lines(ellipses, members, width, SHORT_PIECE, is_tapered=True))
     take(_take_lines(ellipses, members, width, SHORT_PIECE))
     return pieces
 
@@ -132,23 +137,37 @@ def _take_lines(
             break
         chosen = np.flatnonzero(inliers)
         model, along = _fit_line(e, chosen, is_tapered)
-        part = _longest_part(along, max(8 * width, 3 * model.radius))
-        chosen, along = chosen[part], along[part]
-        free[chosen] = False
-        if len(chosen) < MIN_ELLIPSES or np.ptp(along) < max(
-            min_length * model.radius, 2.5 * width
-        ):
+        # The pair's radius was rough: what is off the piece's own pattern stays free.
+        expected = model.radius + model.slope * along
+        fits = np.abs(e.radius[chosen] - expected) < SAME_RADIUS * expected + 2 * e.radius_sd[chosen]
+        chosen, along = chosen[fits], along[fits]
+        if len(chosen) >= MIN_ELLIPSES:
+            part = _longest_part(along, max(8 * width, 3 * model.radius))
+            chosen, along = chosen[part], along[part]
+        too_short = max(min_length * model.radius, 2.5 * width)
+        if len(chosen) < MIN_ELLIPSES or np.ptp(along) < too_short:
             n_failed += 1
-            if is_tapered or min_length == SHORT_PIECE:
-                continue
-            # Too short for now; other pieces may still be found among the rest.
+            free[chosen if len(chosen) else inliers] = False
             continue
+        free[chosen] = False
         model, along = _fit_line(e, chosen, is_tapered)
-        if is_tapered and abs(model.slope) < 0.04:
+        taper, taper_sd = _taper(e, chosen, along)
+        if is_tapered != (abs(taper) > max(MIN_TAPER, 6 * taper_sd)):
             continue
         half = 0.5 * width
         pieces.append(Piece(model, members[chosen], along.min() - half, along.max() + half))
     return pieces
+
+
+def _taper(e: Ellipses, chosen: NDArray[np.intp], along: Array) -> tuple[float, float]:
+    """Change of the radius along the axis, and its standard deviation."""
+    weight = 1.0 / (e.radius_sd[chosen] ** 2 + 1e-8)
+    s = along - (weight @ along) / weight.sum()
+    r = e.radius[chosen] - (weight @ e.radius[chosen]) / weight.sum()
+    spread = weight @ s**2
+    taper = (weight @ (s * r)) / spread
+    scatter = np.sqrt((weight @ (r - taper * s) ** 2) / max(len(chosen) - 2, 1) / spread)
+    return float(taper), float(scatter)
 
 
 def _fit_line(e: Ellipses, chosen: NDArray[np.intp], is_tapered: bool) -> tuple[LineSurface, Array]:
@@ -240,36 +259,23 @@ def arc_extent(model: ArcSurface, points: Array) -> tuple[float, float, NDArray[
 
 
 def find_spheres(ellipses: Ellipses) -> list[Piece]:
-    """Find spheres: ellipses of any direction whose normals meet in one point.
+    """Find spheres: ellipses whose normals meet in one point far from their planes.
 
-    The slope of the normals along the axis, β, puts the sphere's centre r·tan β behind
-    the profile and its radius at r / cos β; on a cylinder such centres spread along the
-    axis, on a sphere they coincide.
+    On a cylinder the normals of a section meet in its own plane; on a sphere those of
+    all sections meet in the centre, however far from it they were cut.
     """
-    sine = np.clip(ellipses.slope, -0.9, 0.9)
-    cosine = np.sqrt(1 - sine**2)
-    centres = ellipses.centre - (ellipses.radius * sine / cosine)[:, None] * ellipses.axis
-    radii = ellipses.radius / cosine
-    free = np.abs(sine) < 0.7
+    centres, radii = ellipses.meeting_point, ellipses.meeting_distance
+    offset = np.einsum("ij,ij->i", ellipses.centre - centres, ellipses.normal) / radii
+    free = np.isfinite(radii)
+    tree = cKDTree(np.where(free[:, None], centres, 1e9))
     pieces: list[Piece] = []
-    candidates = np.flatnonzero(free & (np.abs(sine) > 0.12))
-    if len(candidates) == 0:
-        return pieces
-    tree = cKDTree(centres)
-    tried = np.zeros(len(ellipses), np.bool_)
-    for i in candidates:
-        if not free[i] or tried[i]:
+    for i in np.flatnonzero(free & (np.abs(offset) > 0.15)):
+        if not free[i]:
             continue
-        near = np.array(tree.query_ball_point(centres[i], 0.08 * radii[i]), np.intp)
+        near = np.sort(np.array(tree.query_ball_point(centres[i], 0.06 * radii[i]), np.intp))
         near = near[free[near] & (np.abs(radii[near] - radii[i]) < 0.05 * radii[i])]
-        tried[near] = True
-        # A sphere shows the same centre from well inside and far off it, on all sides.
-        spread = (
-            np.linalg.eigvalsh(np.cov((ellipses.centre[near] - centres[near]).T))
-            if len(near) > 3
-            else np.zeros(3)
-        )
-        if len(near) < 8 or np.ptp(sine[near]) < 0.5 or spread[1] < (0.1 * radii[i]) ** 2:
+        is_far = np.abs(offset[near]) > 0.1
+        if is_far.sum() < MIN_SPHERE or np.ptp(offset[near]) < 0.4:
             continue
         model = SphereSurface(np.median(centres[near], axis=0), float(np.median(radii[near])))
         free[near] = False

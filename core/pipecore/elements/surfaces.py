@@ -91,6 +91,10 @@ class LineSurface:
             self.is_tapered,
         )
 
+    def radius_at(self, point: Array) -> float:
+        """Radius abreast of a point."""
+        return float(self.radius + self.slope * ((point - self.middle) @ self.direction))
+
     def axis_between(self, low: float, high: float) -> LineAxis:
         """The axis from chainage `low` to `high`, counted from the middle."""
         return LineAxis(self.middle + low * self.direction, self.direction, high - low)

@@ -47,8 +47,10 @@ class Ellipses:
         Unit direction of the pipe there, from the points' normals.
     radius, radius_sd : ndarray, shape (m,)
         Of the circle seen along `axis`, metres.
-    slope : ndarray, shape (m,)
-        Mean of the outward normals' component along `axis`: 0 on a cylinder.
+    meeting_point : ndarray, shape (m, 3)
+        Where the points' normals meet: the sphere's centre, if it is one.
+    meeting_distance : ndarray, shape (m,)
+        Mean distance of the points from there.
     arc : ndarray, shape (m,)
         Radians.
     n_points : ndarray of int32, shape (m,)
@@ -67,7 +69,8 @@ class Ellipses:
     axis: Array
     radius: Array
     radius_sd: Array
-    slope: Array
+    meeting_point: Array
+    meeting_distance: Array
     arc: Array
     n_points: NDArray[np.int32]
     rms: Array
@@ -131,8 +134,8 @@ def fit_ellipses(
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
             & (radius <= 1.2 * sizes.max_radius_mm / 1e3)
-            & (fits[:, 12] >= MIN_RADIAL)
-            & (fits[:, 10] <= MAX_OFF_AXIS * fits[:, 11])
+            & (fits[:, 11] >= MIN_RADIAL)
+            & (fits[:, 9] <= MAX_OFF_AXIS * fits[:, 10])
         )
     kept = np.flatnonzero(accepted)
     fits = fits[kept]
@@ -199,7 +202,8 @@ def _to_space(
         axis=axis,
         radius=radius,
         radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),
-        slope=fits[:, 9],
+        meeting_point=fits[:, 12:15] @ frame + curves.mid_plane(kept)[:, None] * frame[2],
+        meeting_distance=fits[:, 15],
         arc=arc,
         n_points=n_points,
         rms=fits[:, 6],

@@ -1,0 +1,137 @@
+"""How far a surface reaches along its axis, and whether its section is round."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MAX_GAP = 4.0
+"""An element goes on across gaps of this many radii, or of `MAX_GAP_LENGTH`."""
+MAX_GAP_LENGTH = 0.25
+SHOWN_GAP = 2.0
+"""Gaps of at least this many radii are reported."""
+MIN_COVERED_ARC = float(np.deg2rad(50.0))
+SHARE_OF_ARC = 0.45
+"""A step of axis is covered if it shows this share of the arc that the element usually shows."""
+MAX_SECTORS = 36
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Where along an axis a surface has points.
+
+    Parameters
+    ----------
+    low, high : float
+        Chainages of the first and last point.
+    arc : float
+        Median arc that covered steps show, radians.
+    coverage : float
+        Share of the steps between `low` and `high` that are covered.
+    gaps : tuple of (float, float)
+        Chainages between which steps are not covered.
+    """
+
+    low: float
+    high: float
+    arc: float
+    coverage: float
+    gaps: tuple[tuple[float, float], ...]
+
+
+def find_extent(
+    chainage: Array, clock: Array, residual: Array, length: float, radius: float, voxel: float,
+    sigma: float,
+) -> Extent | None:
+    """Find how far points on a surface cover its axis, outward from where it was proposed.
+
+    A step of axis is covered if points lie around enough of it and most of them on the
+    surface: where a bend, a reducer or a flange takes over, the residuals grow together.
+
+    Parameters
+    ----------
+    chainage, clock, residual : ndarray, shape (n,)
+        Of the points near the surface.
+    length : float
+        The proposed extent is chainage 0 … `length`.
+    radius, voxel, sigma : float
+        Radius, thinning and noise, metres.
+
+    Returns
+    -------
+    Extent or None
+        None if no step of the proposed extent is covered.
+    """  # fmt: skip
+    if len(chainage) == 0:
+        return None
+    step = max(2.0 * voxel, 0.15 * radius)
+    base = float(chainage.min())
+    row = ((chainage - base) / step).astype(np.intp)
+    n_rows = int(row.max()) + 1
+    # A sector is wide enough to hold a point wherever the surface is seen.
+    n_sectors = int(np.clip(2 * np.pi * radius / (2.0 * voxel), 12, MAX_SECTORS))
+    sector = (clock / (2 * np.pi) * n_sectors).astype(np.intp) % n_sectors
+    seen = np.zeros((n_rows, n_sectors), np.bool_)
+    seen[row, sector] = True
+    arc = seen.sum(axis=1) * (2 * np.pi / n_sectors)
+    middle = base + (np.arange(n_rows) + 0.5) * step
+    is_core = (middle > 0) & (middle < length)
+    if not is_core.any():
+        return None
+    usual_arc = float(np.quantile(arc[is_core], 0.75))
+    # Half of normal residuals are below 0.67 sigma.
+    off = _median_by_row(np.abs(residual), row, n_rows)
+    is_covered = (arc >= max(SHARE_OF_ARC * usual_arc, MIN_COVERED_ARC)) & (
+        off < 1.2 * sigma + min(0.01 * radius, 0.003)
+    )
+    covered = np.flatnonzero(is_covered)
+    if not is_covered[is_core].any():
+        return None
+    longest_gap = max(MAX_GAP * radius, MAX_GAP_LENGTH)
+    parts = np.split(covered, np.flatnonzero(np.diff(covered) * step > longest_gap) + 1)
+    part = max(parts, key=lambda p: int(is_core[p].sum()))
+    first, last = int(part[0]), int(part[-1])
+    breaks = np.flatnonzero((np.diff(part) - 1) * step > SHOWN_GAP * radius)
+    return Extent(
+        float(chainage[row == first].min()),
+        float(chainage[row == last].max()),
+        float(np.median(arc[part])),
+        len(part) / (last - first + 1),
+        tuple((base + (part[b] + 1) * step, base + part[b + 1] * step) for b in breaks),
+    )
+
+
+def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:
+    """Median of the values of each row; infinite where there are none."""
+    order = np.lexsort((values, row))
+    counts = np.bincount(row, minlength=n_rows)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    median = np.full(n_rows, np.inf)
+    used = counts > 0
+    median[used] = values[order][starts[used] + counts[used] // 2]
+    return median
+
+
+def section_misfit(clock: Array, residual: Array, arc: float) -> float:
+    """How far the mean section leaves the shapes that a pipe has, root mean square in metres.
+
+    Those shapes are the circle and, where the arc can tell, the oval. Corners of boxes
+    and the flanges of beams keep a residual of their own in every sector around the axis.
+    """
+    sector = (clock / (2 * np.pi) * MAX_SECTORS).astype(np.intp) % MAX_SECTORS
+    counts = np.bincount(sector, minlength=MAX_SECTORS)
+    median = _median_by_row(residual, sector, MAX_SECTORS)
+    used = counts >= max(5, 0.02 * len(clock))
+    angle = (np.flatnonzero(used) + 0.5) * (2 * np.pi / MAX_SECTORS)
+    n_harmonics = 2 if arc > np.deg2rad(200.0) else 1
+    terms = [np.ones_like(angle)]
+    for k in range(1, n_harmonics + 1):
+        terms += [np.cos(k * angle), np.sin(k * angle)]
+    design = np.stack(terms, axis=1)
+    if len(angle) <= design.shape[1] + 2:
+        return 0.0
+    solution = np.linalg.lstsq(design, median[used], rcond=None)[0]
+    left = median[used] - design @ solution
+    return float(np.sqrt((left**2).sum() / (len(angle) - design.shape[1])))
