@@ -68,14 +68,17 @@ class ChunkMaker:
 
     def chunk(self, column: Callable[[str], Column], fraction: float) -> Chunk:
         """Return the chunk of the columns that `column` gives by role."""
+        with np.errstate(over="ignore", invalid="ignore"):  # Of a damaged file's values.
+            return self._chunk(column, fraction)
+
+    def _chunk(self, column: Callable[[str], Column], fraction: float) -> Chunk:
         first = column("x")
         xyz = np.empty((len(first), 3))
         for axis, role in enumerate("xyz"):
             xyz[:, axis] = column(role)
         intensity = rgb = classification = None
         if "intensity" in self.roles:
-            with np.errstate(over="ignore", invalid="ignore"):
-                intensity = column("intensity").astype(np.float32)
+            intensity = column("intensity").astype(np.float32)
         if "red" in self.roles:
             rgb = self._rgb(np.stack([column(colour) for colour in _COLOURS], axis=1))
         if "classification" in self.roles:

@@ -44,7 +44,7 @@ def open_source(path: Path) -> Iterator[Source]:
         # Not pye57.E57: on an error its constructor may delete the file.
         from pye57 import libe57  # noqa: PLC0415
 
-        image = _open_image(libe57, path)
+        image = libe57.ImageFile(str(path), "r")
     try:
         with told_as_read_errors(path, "E57"):
             root = image.root()
@@ -68,15 +68,6 @@ def open_source(path: Path) -> Iterator[Source]:
         )
     finally:
         image.close()
-
-
-def _open_image(libe57: Any, path: Path) -> Any:
-    try:
-        return libe57.ImageFile(str(path), "r")
-    except libe57.E57Exception as error:
-        if "checksum" in str(error).lower():
-            raise damaged(path, "E57", "its checksum does not match its contents") from error
-        raise
 
 
 def _scan(node: Any, path: Path) -> _Scan:
@@ -136,7 +127,9 @@ def _chunks(libe57: Any, image: Any, scans: list[_Scan], path: Path) -> Iterator
         n_before = 0
         for scan in scans:
             for values, n_read in _values(libe57, image, scan):
-                yield _chunk(scan, values, (n_before + n_read) / n_total)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    chunk = _chunk(scan, values, (n_before + n_read) / n_total)
+                yield chunk
             n_before += scan.n_points
 
 

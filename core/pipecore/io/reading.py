@@ -176,6 +176,7 @@ class _GrowingCloud:
     def finish(self, source: Path) -> PointCloud:
         """Return the cloud; nothing can be added after that."""
         assert self.origin is not None
+        stations = np.concatenate(self.stations) - self.origin
         self.xyz.resize(self.n_points)
         for column in (self.intensity, self.rgb, self.classification):
             if column is not None:
@@ -186,7 +187,7 @@ class _GrowingCloud:
             intensity=self.intensity and self.intensity.array,  # type: ignore[arg-type]
             rgb=self.rgb and self.rgb.array,  # type: ignore[arg-type]
             classification=self.classification and self.classification.array,  # type: ignore[arg-type]
-            stations=np.concatenate(self.stations) - self.origin,
+            stations=stations[np.isfinite(stations).all(axis=1)],
             crs=self.crs,
             source=source,
         )

@@ -71,6 +71,14 @@ class Source:
     stations: Array = field(default_factory=lambda: np.empty((0, 3)))
 
 
+_CAUSES = {
+    "ErrorBadChecksum": "its checksum does not match its contents",
+    "ErrorBadFileLength": "it is not as long as it should be",
+    "failed to fill whole buffer": "it is truncated",
+}
+"""What libraries say of the commonest damages, and what we do."""
+
+
 @contextmanager
 def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
     """Turn whatever a format's library raises on a damaged file into a `ReadError`."""
@@ -85,7 +93,9 @@ def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
             f"“{path.name}” cannot be read ({error.strerror or 'input/output error'})."
         ) from error
     except Exception as error:
-        raise damaged(path, format_name) from error
+        text = str(error)
+        causes = [cause for mark, cause in _CAUSES.items() if mark in text]
+        raise damaged(path, format_name, *causes[:1]) from error
     except BaseException as error:
         # The Rust decoder of LAZ reports its own defects by an exception outside Exception.
         if type(error).__name__ != "PanicException":

@@ -50,6 +50,8 @@ def write_text(path: Path, points: Points, kind: str) -> Path:
 KINDS: dict[str, Callable[[Path, Points], Path]] = {
     "scan.las": write_las,
     "scan.laz": write_las,
+    "grey.laz": lambda path, points: write_las(path, points, point_format=6),
+    "old.laz": lambda path, points: write_las(path, points, point_format=3),
     "ascii.ply": lambda path, points: write_ply(path, points, text=True),
     "little.ply": lambda path, points: write_ply(path, points, False, "<"),
     "big.ply": lambda path, points: write_ply(path, points, False, ">"),

@@ -56,7 +56,7 @@ def write_las(path: Path, points: Any, *, point_format: int = 7, colour_factor: 
     las.xyz = points.xyz
     las.intensity = points.intensity
     las.classification = points.intensity % 32
-    if point_format == 7:
+    if point_format in (3, 7):
         las.red, las.green, las.blue = points.rgb.T.astype(np.uint16) * colour_factor
     las.write(path)
     return path
