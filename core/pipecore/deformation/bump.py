@@ -1,11 +1,10 @@
 """The shape of one dent or bulge: a smooth bump fitted to its points.
 
-The bump is h·b(u, v) + c, where u and v are distances from its peak along and around
-the pipe as shares of half its length and half its width, and c is what the contour may
-be off by. Its section is a cosine, cos²(π/2 · tᑫ): round for q = 1, flat-bottomed
-above, pointed below. In plan it is a product (b = f(u)·f(v)) or an ellipse (b = f(√(u² + v²)));
-the better of them by AIC stands. Length and width are where the bump has come back to zero,
-so that a cosine bump of nominal extent has just that extent.
+The bump is h·b(ρ) + c over an ellipse, where ρ is the distance from its peak in shares of
+half its length and half its width, and c is what the contour may be off by. Its section
+b is a cosine, cos²(π/2 · ρᑫ): plain for q = 1, flat-bottomed above, pointed below.
+Length and width are where the bump has come back to zero, so that a cosine bump of
+nominal extent has just that extent.
 """
 
 from dataclasses import dataclass
@@ -19,8 +18,20 @@ MAX_POINTS = 6000
 MIN_EXTENT, MAX_EXTENT = 0.1, 3.0
 """Bounds of a bump's length and width, shares of the outside diameter."""
 
+TYPICAL_EXTENT, EXTENT_PRIOR = 0.5, 1.0
+"""Extents believed in beforehand (shares of the diameter), and the sd of their logarithms."""
+
 CLEAR = 12.0
-"""Significance from which the shape is fitted as well (flat-bottomed, pointed)."""
+"""Significance from which the form is fitted as well (flat-bottomed, pointed)."""
+
+FREE_FORM_ADVANTAGE = 6.0
+"""How much lower its AIC must be."""
+
+HEIGHT_PRIOR = 0.5
+"""Standard deviation of heights believed in beforehand, share of the diameter."""
+
+FORM_PRIOR, ROUNDNESS_PRIOR = 0.4, 0.5
+"""Weak beliefs: standard deviations of log q around 0, and of log(length / width) around 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +55,11 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
+    """Parameters: height, two of place, log length and width, offset, log q if free."""
+
     parameters: Array
     covariance: Array
     chi2: float
-    aic: float
-    is_ellipse: bool
 
 
 def fit_bump(
@@ -61,7 +72,6 @@ def fit_bump(
     diameter: float,
     contour_sd: float,
     inflation: float,
-    is_final: bool = True,
 ) -> Bump | None:
     """Fit a bump to points (n,) in the plane; None if they do not carry one.
 
@@ -76,54 +86,35 @@ def fit_bump(
     diameter, contour_sd : float
     inflation : float
         How much larger the noise of means is than that of points alone would make it.
-    is_final : bool
-        Whether all forms are tried; else only the plain one, which suffices for a mask.
     """
     height, length, width = start
-    fits: list[_Fit] = []
-    for is_first in (True, False):  # the second time with a window that suits the extents found
+    first = np.array([height, 0.0, 0.0, np.log(length), np.log(width), 0.0])
+    for _ in range(2):  # the second time with a window that suits the extents found
         near = (np.abs(along) < 0.8 * length) & (np.abs(around) < 0.8 * width)
         if np.count_nonzero(near) < 8:
             return None
         data = _thin(along[near], around[near], deviation[near], noise[near] * inflation)
-        first = np.array([height, 0.0, 0.0, np.log(length), np.log(width), 0.0])
-        if fits:
-            first = min(fits, key=lambda f: f.aic).parameters[:6]
-        shapes = [(True, False)]
-        if is_final and not is_first:
-            shapes.append((False, False))
-        if len(shapes) > 1 and abs(height) / max(_height_sd(data, length, width), 1e-9) > CLEAR:
-            shapes += [(False, True), (True, True)]
-        fits = [
-            _fit(
-                data,
-                first,
-                is_ellipse=is_ellipse,
-                free_shape=free_shape,
-                diameter=diameter,
-                contour_sd=contour_sd,
-            )
-            for is_ellipse, free_shape in shapes
-        ]
-        best = min(fits, key=lambda f: f.aic)
-        height, length, width = best.parameters[0], *np.exp(best.parameters[3:5])
-    dof = max(len(data[0]) - len(best.parameters), 1)
-    misfit = float(np.sqrt(best.chi2 / dof))
-
-    # What is not known of the shape is part of the uncertainty of the depth.
-    weights = np.exp(-0.5 * (np.array([f.aic for f in fits]) - best.aic))
-    weights /= weights.sum()
-    heights = np.array([f.parameters[0] for f in fits])
-    variances = np.array([f.covariance[0, 0] for f in fits]) * max(misfit, 1.0) ** 2
-    variance = float(weights @ (variances + (heights - heights[fits.index(best)]) ** 2))
+        plain = _fit(data, first, diameter, contour_sd)
+        first = plain.parameters
+        length, width = np.exp(first[3:5])
+        if min(length, width) < MIN_EXTENT * diameter or max(length, width) > MAX_EXTENT * diameter:
+            return None
+    best = plain
+    if abs(first[0]) > CLEAR * _height_sd(data, length, width):
+        free = _fit(data, np.append(first, 0.0), diameter, contour_sd)
+        # One parameter more has to be worth it.
+        if free.chi2 < plain.chi2 - 2 - FREE_FORM_ADVANTAGE:
+            best = free
+    height, along_peak, around_peak = best.parameters[:3]
+    length, width = np.exp(best.parameters[3:5])
+    misfit = float(np.sqrt(best.chi2 / max(len(data[0]) - len(best.parameters), 1)))
     # Curvatures from the plain cosine: exponents make them zero or infinite at the peak.
-    plain = min((f for f in fits if len(f.parameters) == 6), key=lambda f: f.aic).parameters
-    second = 2 * np.pi**2 * abs(plain[0]) / np.exp(2 * plain[3:5])
+    second = 2 * np.pi**2 * abs(plain.parameters[0]) / np.exp(2 * plain.parameters[3:5])
     return Bump(
-        along=float(best.parameters[1]),
-        around=float(best.parameters[2]),
-        height=float(best.parameters[0]),
-        height_sd=float(np.sqrt(variance)),
+        along=float(along_peak),
+        around=float(around_peak),
+        height=float(height),
+        height_sd=float(np.sqrt(best.covariance[0, 0]) * max(misfit, 1.0)),
         length=float(length),
         width=float(width),
         curvature_along=float(second[0]),
@@ -132,75 +123,51 @@ def fit_bump(
     )
 
 
-def bump_shape(u: Array, v: Array, q: float, is_ellipse: bool) -> Array:
-    """Values of the bump (1 at the peak, 0 at |t| = 1) at shares of its half extents."""
-    if is_ellipse:
-        return _section(np.hypot(u, v), q)
-    return np.asarray(_section(u, q) * _section(v, q))
-
-
-def _section(t: Array, q: float) -> Array:
-    t = np.minimum(np.abs(t), 1.0)
+def bump_shape(rho: Array, q: float = 1.0) -> Array:
+    """Values of the bump (1 at the peak, 0 from ρ = 1 on)."""
+    t = np.minimum(rho, 1.0)
     return np.asarray(np.cos(np.pi / 2 * (t if q == 1.0 else t**q)) ** 2)
 
 
 def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:
     """Noise of the height of a bump whose place and size are known."""
     along, around, _, noise = data
-    b = bump_shape(2 * along / length, 2 * around / width, 1.0, False)
+    b = bump_shape(np.hypot(2 * along / length, 2 * around / width))
     return float(1.0 / np.sqrt(max(np.sum((b / noise) ** 2), 1e-12)))
 
 
-def _fit(
-    data: tuple[Array, ...],
-    first: Array,
-    *,
-    is_ellipse: bool,
-    free_shape: bool,
-    diameter: float,
-    contour_sd: float,
-) -> _Fit:
+def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: float) -> _Fit:
     along, around, deviation, noise = data
-    offset_sd = max(contour_sd, 1e-5)
-    extent = np.exp(first[3:5])
-    low = np.array(
-        [-np.inf, -0.6 * extent[0], -0.6 * extent[1], *[np.log(MIN_EXTENT * diameter)] * 2]
-    )
-    high = np.array(
-        [np.inf, 0.6 * extent[0], 0.6 * extent[1], *[np.log(MAX_EXTENT * diameter)] * 2]
-    )
-    low, high = np.append(low, -np.inf), np.append(high, np.inf)
-    start = np.append(first[:6], 0.0) if free_shape else first[:6].copy()
-    if free_shape:
-        low, high = np.append(low, np.log(0.5)), np.append(high, np.log(3.0))
-    start[1:3] = np.clip(start[1:3], 0.99 * low[1:3], 0.99 * high[1:3])
-    start[3:5] = np.clip(start[3:5], low[3:5] + 1e-6, high[3:5] - 1e-6)
-    low[1:3] += np.minimum(start[1:3], 0)
-    high[1:3] += np.maximum(start[1:3], 0)
+    extent_log = np.log(TYPICAL_EXTENT * diameter)
+    slack = 0.3 * np.exp(first[3:5])
 
     def residuals(p: Array) -> Array:
-        q = float(np.exp(p[6])) if free_shape else 1.0
+        q = float(np.exp(p[6])) if len(p) > 6 else 1.0
         u, v = 2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4])
-        model = p[0] * bump_shape(u, v, q, is_ellipse) + p[5]
-        return np.append((deviation - model) / noise, p[5] / offset_sd)
+        model = p[0] * bump_shape(np.hypot(u, v), q) + p[5]
+        beliefs = [
+            p[0] / (HEIGHT_PRIOR * diameter),
+            *(p[1:3] / slack),
+            *((p[3:5] - extent_log) / EXTENT_PRIOR),
+            (p[3] - p[4]) / ROUNDNESS_PRIOR,
+            p[5] / max(contour_sd, 1e-5),
+            np.log(q) / FORM_PRIOR,
+        ]
+        return np.append((deviation - model) / noise, beliefs)
 
-    scale = np.array([1e-3, 0.1 * extent[0], 0.1 * extent[1], 0.1, 0.1, 1e-3, 0.2])[: len(start)]
+    scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
     answer = least_squares(
         residuals,
-        start,
-        bounds=(low, high),
+        first,
+        method="lm",
         x_scale=scale,
         diff_step=1e-5,
-        max_nfev=40,
+        max_nfev=400,
         ftol=1e-5,
         xtol=1e-5,
     )
     information = answer.jac.T @ answer.jac
-    # An extent at its bound has no slope; a trace of prior keeps the inverse finite.
-    information += np.diag(1e-6 / np.maximum(scale, 1e-9) ** 2)
-    covariance = np.linalg.inv(information)
-    chi2 = 2 * float(answer.cost)
-    return _Fit(answer.x, covariance, chi2, chi2 + 2 * len(start), is_ellipse)
+    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost))
 
 
 def _thin(

@@ -8,7 +8,7 @@ from pipecore.deformation.reference import Contour
 from pipecore.geometry import Array
 
 KINK_ADVANTAGE = 20.0
-"""How much lower the AIC of two straight pieces must be than that of a parabola."""
+"""How much lower the χ² of two straight pieces must be than that of smooth bows."""
 
 MIN_KINK = np.deg2rad(0.3)
 MIN_BOW_RATIO = 0.001
@@ -30,7 +30,7 @@ class CentreLine:
     is_kink: bool
 
 
-def measure_centre_line(contour: Contour, inflation: float) -> CentreLine:
+def measure_centre_line(contour: Contour) -> CentreLine:
     """Measure a contour fitted with a constant radius against the chord of its ends."""
     s = contour.grid.chainages
     offset = contour.terms[:, 1:3]
@@ -45,7 +45,7 @@ def measure_centre_line(contour: Contour, inflation: float) -> CentreLine:
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     return CentreLine(
         float(distance[peak]),
-        float(sd) * inflation,
+        float(sd),
         float(s[peak]),
         float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi)),
         _is_kink(s, deviation @ side, covariance, side),
@@ -58,7 +58,11 @@ def _chord(s: Array, offset: Array) -> Array:
 
 
 def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
-    """Whether two straight pieces fit the line of centres better than a parabola."""
+    """Whether two straight pieces fit the line of centres better than smooth bows.
+
+    These are a parabola and the line of a beam clamped at both ends, with as many
+    parameters as the two pieces.
+    """
     step = max(1, len(s) // 40)
     s, lateral = s[::step], lateral[::step]
     if len(s) < 8:
@@ -71,10 +75,10 @@ def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
         solution, *_ = np.linalg.lstsq(design, lateral / sd, rcond=None)
         return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
 
-    parabola, _ = chi2([np.ones_like(x), x, x**2])
+    smooth, _ = chi2([np.ones_like(x), x, x**2, np.cos(2 * np.pi * x)])
     best, angle = np.inf, 0.0
     for knee in x[2:-2]:
         value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
         if value < best:
             best, angle = value, abs(float(solution[2])) / (s[-1] - s[0])
-    return bool(best + 2 + KINK_ADVANTAGE < parabola and angle > MIN_KINK)
+    return bool(best + KINK_ADVANTAGE < smooth and angle > MIN_KINK)

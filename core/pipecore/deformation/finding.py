@@ -10,7 +10,13 @@ from pipecore.deformation.centre_line import MIN_BOW_RATIO, measure_centre_line
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
 from pipecore.deformation.patches import Patch, find_patches
-from pipecore.deformation.reference import Contour, fit_contour, usable_arc
+from pipecore.deformation.reference import (
+    KNOT_DIAMETERS,
+    OVAL_KNOT_DIAMETERS,
+    Contour,
+    fit_contour,
+    usable_arc,
+)
 from pipecore.deformation.strain import dent_strain
 from pipecore.deformation.surface import Surface, own_surface
 from pipecore.deformation.unrolled import surface_distance, unroll
@@ -83,7 +89,23 @@ def find_deformations(
         )
     heights = _height_map(element, surface, neighbours)
     n_terms = 5 if usable_arc(surface.grid, heights.covered) >= MIN_ARC else 3
-    patches, contour = find_patches(element, surface, heights, n_terms, settings.significance)
+
+    def search(knot_diameters: float) -> tuple[list[Patch], Contour]:
+        return find_patches(
+            element,
+            surface,
+            heights,
+            settings.significance,
+            n_terms=n_terms,
+            knot_diameters=knot_diameters,
+        )
+
+    patches, contour = search(KNOT_DIAMETERS)
+    min_ovality = settings.min_ovality_pct / 100
+    stretches = oval_stretches(contour, min_ovality) if n_terms == 5 else []
+    if stretches:
+        patches, contour = search(OVAL_KNOT_DIAMETERS)
+        stretches = oval_stretches(contour, min_ovality)
 
     deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
     least = settings.min_depth_mm / 1000
@@ -91,7 +113,6 @@ def find_deformations(
     ovality = ovality_sd = np.nan
     if n_terms == 5:
         ovality, ovality_sd = mean_ovality(contour)
-        stretches = oval_stretches(contour, settings.min_ovality_pct / 100, 1.0)
         deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
     straightness = np.nan
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
@@ -213,7 +234,7 @@ def _measure_bow(
     contour = fit_contour(
         grid, heights.deviation, variance, n_terms, knot_diameters=4.0, constant_radius=True
     )
-    line = measure_centre_line(contour, 1.0)
+    line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
     if line.straightness_sd > settings.min_depth_mm / 1000:
         return np.nan, []

@@ -55,13 +55,12 @@ def mean_ovality(contour: Contour) -> tuple[float, float]:
     return float(amplitude * to_ratio), float(np.sqrt(variance) * to_ratio)
 
 
-def oval_stretches(contour: Contour, min_ovality: float, inflation: float) -> list[OvalStretch]:
+def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
     """Return stretches at least one diameter long whose ovality reaches `min_ovality`.
 
     A stretch goes on where the ovality stays above half of `min_ovality`.
     """
     ovality, sd, clock = ovality_along(contour)
-    sd = sd * inflation
     found = []
     for first, last in runs((ovality > 0.5 * min_ovality) & (sd < min_ovality)):
         peak = first + int(np.argmax(ovality[first : last + 1]))

@@ -13,10 +13,13 @@ from pipecore.deformation.unrolled import stretch
 from pipecore.geometry import Array
 from pipecore.types import Element
 
-MASK = 1.15
-"""The contour is fitted without the bumps, this much larger than they are."""
+MASK = 1.2
+"""The contour is fitted without the bumps, this much larger than the filter that saw them."""
 
-N_ROUNDS = 3
+MASKED_FROM = 0.7
+"""Share of the significance from which the contour does without a place."""
+
+N_ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,34 +41,41 @@ class Patch:
 
 
 def find_patches(
-    element: Element, surface: Surface, cells: DeviationMap, n_terms: int, significance: float
+    element: Element,
+    surface: Surface,
+    cells: DeviationMap,
+    significance: float,
+    *,
+    n_terms: int,
+    knot_diameters: float,
 ) -> tuple[list[Patch], Contour]:
     """Return the bumps above `significance`, and the contour that they were measured against.
 
-    Finding and fitting the contour take turns: the contour is fitted without the bumps
-    found so far, the bumps are looked for over the contour without them.
+    Looking for bumps and fitting the contour take turns: the contour is fitted without
+    the places that stand out so far, and more stands out over the better contour.
     """
     grid = cells.grid
     variance = np.where(cells.count > 0, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
-    contour = fit_contour(grid, cells.deviation, variance, n_terms)
-    patches: list[Patch] = []
-    for turn in range(N_ROUNDS):
-        threshold = significance if turn == N_ROUNDS - 1 else 0.75 * significance
-        is_final = turn == N_ROUNDS - 1
-        candidates = _candidates(cells, contour, 0.75 * significance)
+
+
+    def contour_by(variance: Array) -> Contour:
+        return fit_contour(
+            grid, cells.deviation, variance, n_terms, knot_diameters=knot_diameters
+        )
+
+    contour = contour_by(variance)
+    for _ in range(N_ROUNDS):
         masked = np.zeros(grid.shape, dtype=bool)
-        measured = []
-        for seen in candidates:
+        for seen in _candidates(cells, contour, MASKED_FROM * significance):
             masked |= disc(grid, seen.chainage, seen.clock, MASK * seen.length, MASK * seen.width)
-            if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 2:
-                measured.append(_measure(element, surface, cells, contour, seen, is_final))
-        patches = _without_overlap([p for p in measured if p is not None and abs(p.z) >= threshold])
-        if not is_final:
-            for patch in patches:
-                masked |= patch.cells(grid, MASK)
-            outside = np.where(masked, np.inf, variance)
-            contour = fit_contour(grid, cells.deviation, outside, n_terms)
-    return [p for p in patches if p.is_enclosed], contour
+        contour = contour_by(np.where(masked, np.inf, variance))
+    patches = []
+    for seen in _candidates(cells, contour, MASKED_FROM * significance):
+        if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 3:
+            patch = _measure(element, surface, cells, contour, seen)
+            if patch is not None and abs(patch.z) >= significance and patch.is_enclosed:
+                patches.append(patch)
+    return _without_overlap(patches), contour
 
 
 def _candidates(cells: DeviationMap, contour: Contour, threshold: float) -> list[Candidate]:
@@ -84,7 +94,6 @@ def _measure(
     cells: DeviationMap,
     contour: Contour,
     seen: Candidate,
-    is_final: bool,
 ) -> Patch | None:
     grid, points = surface.grid, surface.points
     reach = 2.5 * max(seen.length, seen.width)
@@ -109,7 +118,6 @@ def _measure(
         diameter=2 * radius,
         contour_sd=contour_sd,
         inflation=seen.inflation,
-        is_final=is_final,
     )
     if bump is None:
         return None

@@ -19,6 +19,9 @@ from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
 KNOT_DIAMETERS = 2.0
+OVAL_KNOT_DIAMETERS = 0.75
+"""Knots along elements that are oval somewhere, as ovality may set in within a diameter."""
+
 MAX_INTERVALS = 60
 FLOOR = 2e-4
 """Cell means are not trusted below 0.2 mm, however many points they have."""
@@ -98,9 +101,8 @@ def fit_contour(
     *,
     knot_diameters: float = KNOT_DIAMETERS,
     constant_radius: bool = False,
-    robust: bool = True,
 ) -> Contour:
-    """Fit a contour to cell means.
+    """Fit a contour to cell means, robustly (Cauchy's weights, then Tukey's).
 
     Parameters
     ----------
@@ -111,8 +113,6 @@ def fit_contour(
         3 (round) or 5 (with the second harmonic).
     constant_radius : bool
         Whether the radius is the same along the whole length.
-    robust : bool
-        Weigh cells down that do not agree (Cauchy, then Tukey), else trust all.
     """
     basis = spline_basis(grid, knot_diameters)
     n_splines = basis.shape[1]
@@ -123,8 +123,7 @@ def fit_contour(
     base = np.where(used, 1.0 / (np.where(used, variance, 1.0) + FLOOR**2), 0.0)
 
     weight = base
-    losses = [_cauchy] * 6 + [_tukey] * 6 if robust else []
-    for loss in [*losses, None]:
+    for loss in [*[_cauchy] * 6, *[_tukey] * 6, None]:
         moments = np.einsum("rc,ck,cl->rkl", weight, phi, phi, optimize=True)
         right = np.einsum("rc,ck->rk", weight * y, phi, optimize=True)
         normal = np.einsum("ra,rkl,rb->akbl", basis, moments, basis, optimize=True) + prior

@@ -153,13 +153,14 @@ class PipeScene:
             hidden = _is_hidden(clutter, to_station, axis, self.radius)
             clutter = clutter[~hidden]
         if self.mixed:
-            # At the limb a part of the beam goes on to what lies behind.
-            _, _, theta_p = axis.pipe_coordinates(p)
-            off = np.abs(np.mod(theta_p - view + np.pi, 2 * np.pi) - np.pi)
-            edge = (off > self.arc / 2 - 0.15) & (rng.uniform(size=len(p)) < 0.3)
-            back = rng.exponential(0.03, int(edge.sum()))
-            p[edge] -= back[:, None] * to_station
-            own[edge] = False
+            # At the limb a part of the beam goes on past the pipe to what lies behind.
+            s_p, rho, theta_p = axis.pipe_coordinates(p)
+            turn = np.mod(theta_p - view + np.pi, 2 * np.pi) - np.pi
+            edge = (np.abs(turn) > self.arc / 2 - 0.15) & (rng.uniform(size=len(p)) < 0.3)
+            limb = view + np.sign(turn) * np.pi / 2
+            grazing = surface_points(axis, s_p, rho + rng.uniform(0, 0.002, len(p)), limb)
+            back = rng.exponential(0.03, len(p))[:, None] * to_station
+            p, own = np.where(edge[:, None], grazing - back, p), own & ~edge
         p = np.concatenate([p, clutter])
         own = np.concatenate([own, np.zeros(len(clutter), bool)])
         p = p + self.noise * rng.normal(size=len(p))[:, None] * to_station
