@@ -13,34 +13,43 @@ from typing import Any
 from PySide6.QtCore import QObject, Signal
 
 from pipecore.errors import ReadError
-from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.types import PointCloud, Result
 from pipegui.document import Scan
-from pipegui.worker import Cancelled, Event, Failed, Finished, Progressed, Started, Worker
+from pipegui.worker import (
+    Cancelled,
+    Event,
+    Failed,
+    Finished,
+    JobProgress,
+    Progressed,
+    Started,
+    Worker,
+)
 
-ReadFunction = Callable[[Path, Settings, Progress], PointCloud]
-DetectFunction = Callable[[PointCloud, Settings, Progress], Result]
+ReadFunction = Callable[[Path, Settings, JobProgress], PointCloud]
+DetectFunction = Callable[[PointCloud, Settings, JobProgress], Result]
 
 
-def read_file(path: Path, settings: Settings, progress: Progress) -> PointCloud:
+def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointCloud:
     """Read a scan with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
     return read(path, length_unit=settings.input.length_unit, progress=progress)
 
 
-def detect_pipes(cloud: PointCloud, settings: Settings, progress: Progress) -> Result:
+def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -> Result:
     """Detect with pipecore."""
-    from pipecore.pipeline import detect  # noqa: PLC0415 - numba takes its time
+    from pipecore.pipeline import STAGES, detect  # noqa: PLC0415 - numba takes its time
 
+    progress.expect(STAGES)
     return detect(cloud, settings, progress=progress)
 
 
 @dataclass(frozen=True)
 class _Request:
     title: str
-    work: Callable[[Progress], Any]
+    work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
 
 
@@ -87,7 +96,7 @@ class Jobs(QObject):
         """Read each file as a scan of its own."""
         for path in paths:
 
-            def work(progress: Progress, path: Path = path) -> Scan:
+            def work(progress: JobProgress, path: Path = path) -> Scan:
                 cloud = self._read(path, settings, progress)
                 if not len(cloud):
                     raise ReadError(f"“{path.name}” holds no points.")
@@ -98,12 +107,12 @@ class Jobs(QObject):
     def detect(self, cloud: PointCloud, settings: Settings) -> None:
         """Detect on a cloud."""
 
-        def work(progress: Progress) -> Result:
+        def work(progress: JobProgress) -> Result:
             return self._detect(cloud, settings, progress)
 
         self._request(_Request("Detecting", work, lambda r: self.detected.emit(cloud, r)))
 
-    def write(self, path: Path, write: Callable[[Progress], None]) -> None:
+    def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
         """Write something that takes its time."""
         self._request(_Request("Exporting", write, lambda _: self.written.emit(path)))
 

@@ -9,7 +9,7 @@ import queue
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -17,7 +17,6 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, Signal, Slot
 
 from pipecore.errors import CancelledError, PipecoreError
-from pipecore.progress import Progress
 
 
 @dataclass(frozen=True)
@@ -30,13 +29,13 @@ class Started:
 
 @dataclass(frozen=True)
 class Progressed:
-    """A job is in a stage, done to a fraction (0 to 1) of the stage."""
+    """A job is in a stage, done to a fraction (0 to 1) of all, as far as it knows its stages."""
 
     job: int
     stage: str
     fraction: float
     seconds_left: float | None
-    """For the stage, once it has run long enough to tell."""
+    """Once it has run long enough to tell."""
 
 
 @dataclass(frozen=True)
@@ -64,19 +63,23 @@ class Cancelled:
 
 
 Event = Started | Progressed | Finished | Failed | Cancelled
-Work = Callable[[Progress], Any]
 
 EVENTS_PER_SECOND = 15
 
 
-class _JobProgress:
+class JobProgress:
     """The progress that a job reports to: emits at a calm pace, raises once cancelled."""
 
     def __init__(self, job: int, emit: Callable[[Event], None]) -> None:
         self.is_cancelled = threading.Event()
         self._job, self._emit = job, emit
-        self._stage, self._since = "", 0.0
+        self._stage, self._since = "", time.monotonic()
         self._last_emitted = 0.0
+        self._shares: Mapping[str, float] = {}
+
+    def expect(self, shares: Mapping[str, float]) -> None:
+        """Take note of the stages to come, in their order, with their shares of the time."""
+        self._shares, self._since = shares, time.monotonic()
 
     def update(self, stage: str, fraction: float) -> None:
         """Tell how far a stage is."""
@@ -85,14 +88,27 @@ class _JobProgress:
         now = time.monotonic()
         is_new = stage != self._stage
         if is_new:
-            self._stage, self._since = stage, now
+            self._stage = stage
+            if stage not in self._shares:
+                self._since = now
         if not is_new and now - self._last_emitted < 1 / EVENTS_PER_SECOND:
             return
         self._last_emitted = now
+        done = self._of_all(stage, min(max(fraction, 0.0), 1.0))
         elapsed = now - self._since
-        can_tell = elapsed > 1.0 and fraction > 0.05
-        left = elapsed * (1 - fraction) / fraction if can_tell else None
-        self._emit(Progressed(self._job, stage, min(max(fraction, 0.0), 1.0), left))
+        left = elapsed * (1 - done) / done if elapsed > 1.0 and done > 0.05 else None
+        self._emit(Progressed(self._job, stage, done, left))
+
+    def _of_all(self, stage: str, fraction: float) -> float:
+        """How much of the whole work is done; of the stage where no more is known."""
+        if stage not in self._shares:
+            return fraction
+        stages = list(self._shares)
+        before = sum(self._shares[s] for s in stages[: stages.index(stage)])
+        return (before + fraction * self._shares[stage]) / sum(self._shares.values())
+
+
+Work = Callable[[JobProgress], Any]
 
 
 class Worker(QObject):
@@ -110,8 +126,8 @@ class Worker(QObject):
         super().__init__(parent)
         self._numbers = count(1)
         self._current = 0
-        self._progress: _JobProgress | None = None
-        self._jobs: queue.SimpleQueue[tuple[_JobProgress, int, Work] | None] = queue.SimpleQueue()
+        self._progress: JobProgress | None = None
+        self._jobs: queue.SimpleQueue[tuple[JobProgress, int, Work] | None] = queue.SimpleQueue()
         self._posted.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
         self._thread = threading.Thread(target=self._run, name="pipegui-worker", daemon=True)
         self._thread.start()
@@ -125,7 +141,7 @@ class Worker(QObject):
         """Begin `work(progress)`, which returns the job's value; returns the job's number."""
         self.cancel()
         job = next(self._numbers)
-        self._current, self._progress = job, _JobProgress(job, self._posted.emit)
+        self._current, self._progress = job, JobProgress(job, self._posted.emit)
         self.event.emit(Started(job, title))
         self._jobs.put((self._progress, job, work))
         return job
@@ -165,7 +181,7 @@ class Worker(QObject):
             self.event.emit(event)
 
 
-def _end_of(progress: _JobProgress, job: int, work: Work) -> Event:
+def _end_of(progress: JobProgress, job: int, work: Work) -> Event:
     """Do the work; whatever happens becomes the one event that ends it."""
     try:
         progress.update("", 0.0)

@@ -130,3 +130,23 @@ def test_that_time_left_is_told_once_it_can_be_known(worker, qtbot, monkeypatch)
     qtbot.waitUntil(lambda: bool(ends(worker)))
     told = [e.seconds_left for e in worker.events if isinstance(e, Progressed) and e.stage]
     assert told == [None, pytest.approx(12.0)]
+
+
+def test_that_the_stages_shares_make_one_progress_of_the_whole(worker, qtbot, monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr("pipegui.worker.time.monotonic", lambda: clock[0])
+
+    def work(progress):
+        progress.expect({"thinning": 0.2, "profiles": 0.6, "elements": 0.2})
+        clock[0] += 2.0
+        progress.update("profiles", 0.0)
+        clock[0] += 3.0
+        progress.update("profiles", 0.5)
+
+    worker.start("Detecting", work)
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    told = [(e.fraction, e.seconds_left) for e in worker.events if isinstance(e, Progressed)]
+    assert told[1:] == [
+        (pytest.approx(0.2), pytest.approx(8.0)),
+        (pytest.approx(0.5), pytest.approx(5.0)),
+    ]
