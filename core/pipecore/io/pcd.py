@@ -1,6 +1,6 @@
 """PCD, the Point Cloud Library's own format: ascii, binary and binary_compressed."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -97,12 +97,13 @@ def _chunks(
             for records, fraction in read_records(file, path, header.dtype, header.n_points, size):
                 yield maker.chunk(by_role(lambda i, r=records: r[f"f{i}"][:, 0]), fraction)  # type: ignore[misc]
         else:
-            fields = _decompress(file, path, header, size)
+            plain = yield from _decompress(file, path, header, size)
+            fields = _split(plain, header)
             for start in range(0, header.n_points, CHUNK_POINTS):
                 rows = slice(start, start + CHUNK_POINTS)
                 yield maker.chunk(
                     by_role(lambda i, rows=rows: fields[i][rows]),  # type: ignore[misc]
-                    min(1.0, (start + CHUNK_POINTS) / header.n_points),
+                    min(1.0, 0.5 + 0.5 * (start + CHUNK_POINTS) / header.n_points),
                 )
 
 
@@ -151,29 +152,39 @@ def _unpacked(packed: Column, kind: str, shift: int) -> NDArray[np.uint8]:
     return ((bits >> np.uint32(shift)) & np.uint32(255)).astype(np.uint8)
 
 
-def _decompress(file: BinaryIO, path: Path, header: _Header, size: int) -> list[Column]:
-    """Return the fields, each of which a compressed file holds in one piece."""
+def _decompress(
+    file: BinaryIO, path: Path, header: _Header, size: int
+) -> Generator[Chunk, None, NDArray[np.uint8]]:
+    """Return the bytes of all fields; until then yield chunks without points."""
     from pipecore.io import lzf  # noqa: PLC0415  (it brings numba)
 
     n_packed, n_plain = np.frombuffer(file.read(8), dtype="<u4").tolist()
-    dtype = header.dtype
     if n_packed > size - file.tell():
         raise damaged(path, "PCD", "it is truncated")
     if n_plain > n_packed * lzf.BEST_RATIO:
         raise damaged(path, "PCD", "it announces more than it can hold")
-    check_room(path, n_plain, dtype, header.n_points)
+    check_room(path, n_plain, header.dtype, header.n_points)
     packed = np.frombuffer(file.read(n_packed), dtype=np.uint8)
     plain = np.empty(n_plain, dtype=np.uint8)
-    read, written = lzf.decompress(packed, plain, 0, 0, n_plain)
-    if read < 0 or written < n_plain:
-        raise damaged(path, "PCD", "its compressed points cannot be unpacked")
+    read = written = 0
+    while written < n_plain:
+        yield Chunk(np.empty((0, 3)), 0.5 * written / n_plain)
+        stop = min(written + _STEP_BYTES, n_plain)
+        read, written = lzf.decompress(packed, plain, read, written, stop)
+        if read < 0 or written < stop:
+            raise damaged(path, "PCD", "its compressed points cannot be unpacked")
+    return plain
+
+
+def _split(plain: NDArray[np.uint8], header: _Header) -> list[Column]:
+    """Return the fields, each of which a compressed file holds in one piece."""
     fields: list[Column] = []
     offset = 0
     for kind, count in zip(header.types, header.counts, strict=True):
-        itemsize = int(kind[1:]) * count
-        values = plain[offset : offset + itemsize * header.n_points].view("<" + kind)
+        end = offset + int(kind[1:]) * count * header.n_points
+        values = plain[offset:end].view("<" + kind)
         fields.append(values.reshape(header.n_points, count)[:, 0])
-        offset += itemsize * header.n_points
+        offset = end
     return fields
 
 
