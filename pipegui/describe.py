@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -139,11 +140,16 @@ def properties(state: PropertiesState) -> list[Property | Heading]:
     return [*lines, Heading(element.label), *_of_element(element, result)]
 
 
+@lru_cache(maxsize=4)
+def _extent(cloud: PointCloud) -> tuple[Array, Array]:
+    return cloud.xyz.min(axis=0), cloud.xyz.max(axis=0)
+
+
 def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
     cloud = scan.cloud
     yield Heading(scan.name)
     yield Property("Points", f"{len(cloud):,}", str(len(cloud)))
-    low, high = cloud.xyz.min(axis=0), cloud.xyz.max(axis=0)
+    low, high = _extent(cloud)
     extent = " × ".join(f"{v:.2f}" for v in high - low)
     yield Property("Extent", f"{extent} m", " ".join(f"{v:.3f}" for v in high - low))
     middle = cloud.world((low + high) / 2)

@@ -111,25 +111,28 @@ class ProjectModel(QAbstractItemModel):
         if result is None:
             return
         node.elements = tuple(e.element_id for e in result.elements)
+        ranked = by_verdict(result)
         for run_id in sorted({e.run_id for e in result.elements}):
-            self._add_run(node, run_id, result)
-        if result.deformations:
-            text = f"Deformations ({len(result.deformations)})"
-            branch = _Node(NodeKind.DEFORMATIONS, node, index, NO_ID, text, "target")
+            self._add_run(node, run_id, [e for e in result.elements if e.run_id == run_id], ranked)
+        if ranked:
+            branch = _Node(NodeKind.DEFORMATIONS, node, index)
+            branch.text, branch.icon = f"Deformations ({len(ranked)})", "target"
             self._add(branch)
-            for deformation in by_verdict(result):
+            for deformation in ranked:
                 self._add_deformation(branch, deformation, result)
 
-    def _add_run(self, parent: _Node, run_id: int, result: Result) -> None:
-        elements = [e for e in result.elements if e.run_id == run_id]
-        ids = tuple(e.element_id for e in elements)
-        run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, f"Run {run_id}")
-        run.icon, run.elements = "pipe-disconnected", ids
-        run.hint = format_count(len(elements), "element")
-        self._add(run)
+    def _add_run(
+        self, parent: _Node, run_id: int, elements: list[Element], ranked: list[Deformation]
+    ) -> None:
+        if len(elements) > 1:
+            run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, f"Run {run_id}")
+            run.icon, run.elements = "pipe-disconnected", tuple(e.element_id for e in elements)
+            run.hint = format_count(len(elements), "element")
+            parent = self._add(run)
+        # An element that is a run of its own stands alone: one line less to open and to read.
         for element in elements:
-            worst_first = [d for d in by_verdict(result) if d.element_id == element.element_id]
-            self._add_element(run, element, tuple(worst_first))
+            badge = tuple(d for d in ranked if d.element_id == element.element_id)
+            self._add_element(parent, element, badge)
 
     def _add_element(
         self, parent: _Node, element: Element, deformations: tuple[Deformation, ...]
@@ -263,10 +266,22 @@ class ProjectModel(QAbstractItemModel):
         elif selection.element_id:
             wanted = (NodeKind.ELEMENT, selection.element_id)
         elif selection.run_id:
-            wanted = (NodeKind.RUN, selection.run_id)
+            wanted = self._run_node(scan_index, selection.run_id)
         else:
             return QModelIndex()
         for node in self._nodes:
             if (node.scan_index, node.kind, node.item_id) == (scan_index, *wanted):
                 return self.createIndex(node.row, NAME, node.number)
         return QModelIndex()
+
+    def _run_node(self, scan_index: int, run_id: int) -> tuple[NodeKind, int]:
+        """Kind and id of the node that stands for a run: its own, or its only element's."""
+        result = self._state.scans[scan_index].result
+        ids = [e.element_id for e in result.elements if e.run_id == run_id] if result else []
+        return (NodeKind.ELEMENT, ids[0]) if len(ids) == 1 else (NodeKind.RUN, run_id)
+
+    def spanned(self) -> list[QModelIndex]:
+        """Return the nodes whose name may take the whole width."""
+        kinds = (NodeKind.DEFORMATIONS, NodeKind.DEFORMATION)
+        nodes = [node for node in self._nodes if node.kind in kinds]
+        return [self.createIndex(node.row, NAME, node.number) for node in nodes]

@@ -50,6 +50,8 @@ class ProjectTree(QWidget):
             is_new = self.model.apply(state)
             if is_new:
                 self.view.expandToDepth(2)
+                for index in self.model.spanned():
+                    self.view.setFirstColumnSpanned(index.row(), index.parent(), True)
             if is_new or state.selection != before.selection or state.active != before.active:
                 self._show_selection()
         self._layout.setCurrentWidget(self.view if state.scans else self._empty)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import shiboken6
 from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QStandardPaths
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
@@ -32,6 +33,11 @@ def _flush() -> None:
     gc.collect()
 
 
+def _top_level(app: QApplication) -> dict[int, str]:
+    """Top-level widgets by their address in C++: Python's own may be a new one each time."""
+    return {shiboken6.getCppPointer(w)[0]: repr(w) for w in app.topLevelWidgets()}
+
+
 def _render_windows() -> set[int]:
     """Ids of the VTK render windows that are alive; without VTK loaded there are none."""
     import sys
@@ -50,11 +56,11 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
         return
     # Made before the test's own fixtures, and so looked at after they are gone.
     app = request.getfixturevalue("qapp")
-    windows = {id(w) for w in app.topLevelWidgets()}
+    windows = _top_level(app)
     threads, render_windows = set(threading.enumerate()), _render_windows()
     yield
     _flush()
-    left = [w for w in app.topLevelWidgets() if id(w) not in windows]
+    left = [window for address, window in _top_level(app).items() if address not in windows]
     running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
     rendering = _render_windows() - render_windows
     assert not left, f"top-level widgets left behind: {left}"

@@ -60,13 +60,22 @@ def test_that_the_tree_holds_runs_elements_and_deformations(qtbot, document):
     model.apply(resolve(document).tree)
     scan = model.index(0, NAME)
     names = [model.index(r, NAME, scan).data() for r in range(model.rowCount(scan))]
-    assert names == ["Run 1", "Run 2", "Run 3", "Deformations (4)"]
+    assert names == ["Run 1", "Pipe 7", "Run 3", "Deformations (4)"]
     run = model.index(0, NAME, scan)
     assert model.rowCount(run) == 6
     assert model.index(1, NAME, run).data() == "Pipe 2"
     assert model.index(1, RADIUS, run).data() == "84.2"
     assert model.index(1, BADGE, run).data() == "1"
     assert model.index(0, BADGE, run).data() == ""
+
+
+def test_that_a_run_of_one_element_is_shown_as_that_element(qtbot, document):
+    model = ProjectModel()
+    model.apply(resolve(document).tree)
+    run = model.index_of(0, commands.select_run(document, 2).selection)
+    assert model.what(run) == (0, NodeKind.ELEMENT, 7)
+    run = model.index_of(0, commands.select_run(document, 3).selection)
+    assert model.what(run) == (0, NodeKind.RUN, 3)
 
 
 def test_that_a_run_is_half_checked_when_some_of_it_is_hidden(qtbot, document):
