@@ -117,11 +117,14 @@ class Table:
         """
         n_lines, n_left = self.n_lines_before, self.n_rows
         for lines in self._lines():
-            wanted = lines
-            if n_left is not None:
-                wanted = lines[:n_left]
-                n_left -= len(wanted)
-            yield self._parse(wanted, n_lines)
+            start = 0
+            while start < len(lines) and n_left != 0:
+                # Empty lines are no rows: as many lines as rows may not be enough.
+                stop = len(lines) if n_left is None else start + n_left
+                rows = self._parse(lines[start:stop], n_lines + start)
+                n_left = None if n_left is None else n_left - len(rows)
+                start = stop
+                yield rows
             n_lines += len(lines)
             if n_left == 0:
                 return
@@ -129,6 +132,8 @@ class Table:
     def _lines(self) -> Iterator[list[str]]:
         rest = b""
         while block := self.file.read(BLOCK_BYTES):
+            if block.endswith(b"\r"):  # Perhaps half of a line's end.
+                block += self.file.read(1)
             # Latin-1 cannot fail, and what is no number is no number in any encoding.
             lines = (rest + block).splitlines()
             rest = b"" if block.endswith((b"\n", b"\r")) else lines.pop()

@@ -98,6 +98,8 @@ def _find_layout(file: BinaryIO, path: Path) -> _Layout:
     dialect = sniff_dialect(lines[first])
     values = dialect.split(lines[first])
     names = _names(header, dialect) if header is not None else ()
+    if header is not None and is_comment(header) and len(names) != len(values):
+        header, names = None, ()  # A remark that speaks of x, y and z.
     if header is not None and len(names) != len(values):
         raise ReadError(
             f"“{path.name}”: the header names {len(names)} columns, "

@@ -67,6 +67,14 @@ def test_that_a_count_beyond_the_file_is_refused(
         io.read(path)
 
 
+def test_that_empty_lines_are_no_points(tmp_path: Path) -> None:
+    rows = "1 2 3\n\n1 2 4\n\n\n1 2 5\n0 0 0\n"
+    (tmp_path / "a.ply").write_text(
+        HEADER.replace("vertex 1", "vertex 3") + XYZ + "end_header\n" + rows
+    )
+    assert io.read(tmp_path / "a.ply").xyz[:, 2].tolist() == [3, 4, 5]
+
+
 HEADER = "ply\nformat ascii 1.0\nelement vertex 1\n"
 XYZ = "property float x\nproperty float y\nproperty float z\n"
 
@@ -82,7 +90,7 @@ XYZ = "property float x\nproperty float y\nproperty float z\n"
         (HEADER + XYZ + "property vast w\nend_header\n1 2 3 4\n", "line 7"),
         (HEADER + XYZ + "end_header\n1 2\n", "line 8"),
         (HEADER + XYZ + "end_header\n1 2 x\n", "line 8"),
-        (HEADER.replace("1\n", "0\n") + XYZ + "end_header\n", "no valid points"),
+        (HEADER.replace("vertex 1", "vertex 0") + XYZ + "end_header\n", "no valid points"),
         (HEADER + XYZ + "end_header\n", "announces 1 points but holds 0"),
         (HEADER + XYZ + "end_header\nnan 2 inf\n", "no valid points"),
     ],

@@ -7,6 +7,7 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import ReadError
+from pipecore.io import table
 from tests.core.io.writers import FORMS, lines
 
 
@@ -80,6 +81,17 @@ def test_that_rows_that_all_become_longer_in_the_middle_are_an_error(tmp_path: P
     (tmp_path / "a.txt").write_text(text)
     with pytest.raises(ReadError, match="line 200001 is no point"):
         io.read(tmp_path / "a.txt")
+
+
+def test_that_a_line_end_of_two_characters_may_stand_over_the_border_of_blocks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = b"1 2 3\r\n" * 100 + b"1 2\r\n"
+    (tmp_path / "a.txt").write_bytes(text)
+    for size in range(20, 35):
+        monkeypatch.setattr(table, "BLOCK_BYTES", size)
+        with pytest.raises(ReadError, match="line 101 is no point"):
+            io.read(tmp_path / "a.txt")
 
 
 def test_that_remarks_and_empty_lines_between_points_are_passed_over(tmp_path: Path) -> None:
