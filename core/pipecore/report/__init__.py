@@ -84,6 +84,8 @@ def write_html(
     progress: Progress | None = None,
 ) -> None:
     """Write the report as one HTML page; errors as for `write_report`."""
+    progress = progress or NoProgress()
+    progress.update("drawing figures", 0.0)  # importing what draws them takes a while
     from pipecore.report.html import render_html  # noqa: PLC0415
 
     page = render_html(cloud, result, progress)
