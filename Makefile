@@ -26,7 +26,7 @@ lint: venv ## Check style, types and the rules of who may import whom
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
-	$(VENV)/bin/lint-imports --no-logo
+	$(VENV)/bin/lint-imports --no-logo --no-cache
 
 # Without the Qt plugin, so that the core is seen to do without Qt.
 test-core: venv
@@ -58,5 +58,5 @@ system-packages:
 	@installer/system-packages.sh
 
 clean: ## Remove everything that was made here, but for the environment
-	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find core pipegui tests -name __pycache__ -prune -exec rm -rf {} +
