@@ -1,8 +1,13 @@
 """The views that come from elsewhere: 3D scene and plots, made when the window is."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from PySide6.QtWidgets import QWidget
+if TYPE_CHECKING:
+    from pipegui.plots.deviation_map import DeviationMap
+    from pipegui.plots.radius_plot import RadiusPlot
+    from pipegui.plots.section_view import SectionView
+    from pipegui.scene.view import SceneView
 
 
 @dataclass
@@ -12,10 +17,10 @@ class Parts:
     Each has `apply(state)` for its state in `pipegui.view_state`.
     """
 
-    scene: QWidget
-    radius_plot: QWidget
-    section: QWidget
-    map: QWidget
+    scene: "SceneView"
+    radius_plot: "RadiusPlot"
+    section: "SectionView"
+    map: "DeviationMap"
 
 
 def make_parts() -> Parts:

@@ -1,8 +1,8 @@
 """Long work beside the window: one job at a time, told as typed events.
 
 Each job ends in exactly one of `Finished`, `Failed` and `Cancelled`. Starting a job
-cancels the one that runs; what a job still says after that is dropped, except its end,
-which is then `Cancelled`.
+cancels the one that runs. A cancelled job ends at its next sign of progress, and for the
+user in half a second at the latest: what it still says after its end is dropped.
 """
 
 import queue
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, Signal, Slot
+from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from pipecore.errors import CancelledError, PipecoreError
 
@@ -65,6 +65,8 @@ class Cancelled:
 Event = Started | Progressed | Finished | Failed | Cancelled
 
 EVENTS_PER_SECOND = 15
+PATIENCE_MS = 450
+"""How long a cancelled job may take to notice before the user hears that it has ended."""
 
 
 class JobProgress:
@@ -126,6 +128,7 @@ class Worker(QObject):
         super().__init__(parent)
         self._numbers = count(1)
         self._current = 0
+        self._unended: set[int] = set()
         self._progress: JobProgress | None = None
         self._jobs: queue.SimpleQueue[tuple[JobProgress, int, Work] | None] = queue.SimpleQueue()
         self._posted.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
@@ -142,14 +145,17 @@ class Worker(QObject):
         self.cancel()
         job = next(self._numbers)
         self._current, self._progress = job, JobProgress(job, self._posted.emit)
+        self._unended.add(job)
         self.event.emit(Started(job, title))
         self._jobs.put((self._progress, job, work))
         return job
 
     def cancel(self) -> None:
         """Ask the job that runs to stop, at its next sign of progress."""
-        if self._progress is not None:
+        if self._progress is not None and not self._progress.is_cancelled.is_set():
             self._progress.is_cancelled.set()
+            late = Cancelled(self._current)
+            QTimer.singleShot(PATIENCE_MS, self, lambda: self._deliver(late))
 
     def close(self, timeout_s: float = 5.0) -> bool:
         """Cancel, and wait for the thread to end; returns whether it did."""
@@ -166,19 +172,20 @@ class Worker(QObject):
 
     @Slot(object)
     def _deliver(self, event: Event) -> None:
-        is_end = not isinstance(event, Started | Progressed)
-        is_stale = event.job != self._current
-        if self._progress is not None and not is_stale:
-            # A value that comes after the cancel was asked for is not wanted any more.
-            is_unwanted = self._progress.is_cancelled.is_set()
-        else:
-            is_unwanted = True
-        if is_end and is_unwanted:
-            event = Cancelled(event.job)
-        if is_end and not is_stale:
+        if event.job not in self._unended:
+            return
+        is_current = event.job == self._current
+        is_wanted = is_current and self._progress is not None
+        is_wanted = is_wanted and not self._progress.is_cancelled.is_set()
+        if not isinstance(event, Finished | Failed | Cancelled):
+            if is_wanted:
+                self.event.emit(event)
+            return
+        self._unended.remove(event.job)
+        if is_current:
             self._current, self._progress = 0, None
-        if is_end or not is_unwanted:
-            self.event.emit(event)
+        # A value that comes after the cancel was asked for is not wanted any more.
+        self.event.emit(event if is_wanted else Cancelled(event.job))
 
 
 def _end_of(progress: JobProgress, job: int, work: Work) -> Event:

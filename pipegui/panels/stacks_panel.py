@@ -217,11 +217,11 @@ class StackEditor(QWidget):
         self.view_direction: Callable[[], np.ndarray] | None = None
         """Tells where the 3D view looks; set by the window."""
         self.components = [self._component(name) for name in "XYZ"]
-        self.width = QuietSpinBox()
-        self.width.setAccessibleName("Profile width")
-        self.width.setRange(0, 1000)
-        self.width.setSuffix(" mm")
-        self.width.setSpecialValueText("as in the settings")
+        self.width_mm = QuietSpinBox()
+        self.width_mm.setAccessibleName("Profile width")
+        self.width_mm.setRange(0, 1000)
+        self.width_mm.setSuffix(" mm")
+        self.width_mm.setSpecialValueText("as in the settings")
         self.title = QLabel()
         self.title.setObjectName("formTitle")
         self.accept_button = QPushButton("Add")
@@ -247,7 +247,7 @@ class StackEditor(QWidget):
         self.from_view.setToolTip("The direction in which the 3D view looks")
         self.from_view.clicked.connect(self._take_view)
         grid.addWidget(self.from_view, 2, 0)
-        grid.addWidget(self.width, 3, 1, 1, 3)
+        grid.addWidget(self.width_mm, 3, 1, 1, 3)
         buttons = QHBoxLayout()
         buttons.addStretch()
         buttons.addWidget(cancel)
@@ -270,7 +270,7 @@ class StackEditor(QWidget):
         self.title.setText("New stack" if is_new else "Edit stack")
         self.accept_button.setText("Add" if is_new else "Apply")
         self._set(np.array(direction[:3]))
-        self.width.setValue(direction[3] if len(direction) > 3 else 0.0)
+        self.width_mm.setValue(direction[3] if len(direction) > 3 else 0.0)
         self.from_view.setVisible(self.view_direction is not None)
         self.show()
         self.components[0].setFocus()
@@ -290,7 +290,7 @@ class StackEditor(QWidget):
         self.accept_button.setEnabled(any(self._direction()))
 
     def _accept(self) -> None:
-        width = (self.width.value(),) if self.width.value() else ()
+        width = (self.width_mm.value(),) if self.width_mm.value() else ()
         self.hide()
         self.accepted.emit((*self._direction(), *width))
 

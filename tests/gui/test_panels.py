@@ -333,7 +333,7 @@ def test_that_a_stack_is_added_from_the_view_direction(qtbot, document):
     panel.editor.view_direction = lambda: np.array([0.0, 0.6, -0.8])
     qtbot.mouseClick(panel.add_button, LEFT)
     qtbot.mouseClick(panel.editor.from_view, LEFT)
-    panel.editor.width.setValue(15)
+    panel.editor.width_mm.setValue(15)
     with qtbot.waitSignal(panel.added) as told:
         qtbot.mouseClick(panel.editor.accept_button, LEFT)
     assert told.args == [(0.0, 0.6, -0.8, 15.0)]

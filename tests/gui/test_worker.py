@@ -63,6 +63,22 @@ def test_that_a_cancel_is_answered_within_half_a_second(worker, qtbot):
     assert ends(worker) == [Cancelled(job)]
 
 
+def test_that_even_work_that_gives_no_sign_is_let_go_in_half_a_second_and_ends_once(worker, qtbot):
+    running, go = threading.Event(), threading.Event()
+    silent = worker.start("Detecting", lambda _: (running.set(), go.wait(10)))
+    assert running.wait(5)
+    began = time.monotonic()
+    worker.cancel()
+    qtbot.waitUntil(lambda: bool(ends(worker)))
+    assert 0.3 < time.monotonic() - began < 0.7
+    waiting = worker.start("Next", lambda _: "value")
+    qtbot.wait(100)
+    assert ends(worker) == [Cancelled(silent)]
+    go.set()
+    qtbot.waitUntil(lambda: len(ends(worker)) == 2)
+    assert ends(worker) == [Cancelled(silent), Finished(waiting, "value")]
+
+
 def test_that_a_value_made_after_the_cancel_is_not_wanted(worker, qtbot):
     go = threading.Event()
 
