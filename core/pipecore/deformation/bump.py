@@ -24,6 +24,9 @@ TYPICAL_EXTENT, EXTENT_PRIOR = 0.5, 1.0
 CLEAR = 12.0
 """Significance from which the form is fitted as well (flat-bottomed, pointed)."""
 
+CORE = 0.75
+"""Where the fit is held against its points: up to this share of the half extents."""
+
 FREE_FORM_ADVANTAGE = 6.0
 """How much lower its AIC must be."""
 
@@ -39,7 +42,8 @@ class Bump:
     """A fitted bump; lengths in metres in the plane of the unrolled surface.
 
     `height` is signed (outward positive); `curvature_along` and `curvature_around` are
-    the magnitudes of the second derivatives at the peak of the cosine (1/metres).
+    the magnitudes of the second derivatives at the peak of the cosine (1/metres). `misfit`
+    is the root mean square of the residuals under it in units of their noise.
     """
 
     along: float
@@ -107,7 +111,7 @@ def fit_bump(
             best = free
     height, along_peak, around_peak = best.parameters[:3]
     length, width = np.exp(best.parameters[3:5])
-    misfit = float(np.sqrt(best.chi2 / max(len(data[0]) - len(best.parameters), 1)))
+    misfit = _core_misfit(data, best)
     # Curvatures from the plain cosine: exponents make them zero or infinite at the peak.
     second = 2 * np.pi**2 * abs(plain.parameters[0]) / np.exp(2 * plain.parameters[3:5])
     return Bump(
@@ -127,6 +131,19 @@ def bump_shape(rho: Array, q: float = 1.0) -> Array:
     """Values of the bump (1 at the peak, 0 from ρ = 1 on)."""
     t = np.minimum(rho, 1.0)
     return np.asarray(np.cos(np.pi / 2 * (t if q == 1.0 else t**q)) ** 2)
+
+
+def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
+    """Root mean square of the residuals under the bump, in units of the noise."""
+    along, around, deviation, noise = data
+    p = fit.parameters
+    rho = np.hypot(2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4]))
+    core = rho < CORE
+    if np.count_nonzero(core) < 3:
+        return np.inf
+    q = float(np.exp(p[6])) if len(p) > 6 else 1.0
+    residual = (deviation - p[0] * bump_shape(rho, q) - p[5])[core] / noise[core]
+    return float(np.sqrt(np.mean(residual**2)))
 
 
 def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:

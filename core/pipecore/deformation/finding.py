@@ -232,7 +232,7 @@ def _measure_bow(
         used &= ~patch.cells(grid, 1.15)
     variance = np.where(used, heights.noise**2 / np.maximum(heights.count, 1), np.inf)
     contour = fit_contour(
-        grid, heights.deviation, variance, n_terms, knot_diameters=4.0, constant_radius=True
+        grid, heights.deviation, variance, n_terms, knot_diameters=1.5, constant_radius=True
     )
     line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)

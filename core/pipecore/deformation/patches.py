@@ -21,6 +21,9 @@ MASKED_FROM = 0.7
 
 N_ROUNDS = 2
 
+MAX_MISFIT = 1.8
+"""A bulge whose points lie further from its fit (in units of noise) is two surfaces."""
+
 
 @dataclass(frozen=True, eq=False)
 class Patch:
@@ -177,7 +180,7 @@ def _is_enclosed(cells: DeviationMap, chainage: float, clock: float, bump: Bump)
     if bump.height < 0:
         return n_closed >= 3
     disputed = np.count_nonzero(dilate(cells.disputed) & inside)
-    return n_closed == 4 and disputed < 0.1 * np.count_nonzero(inside) and bump.misfit < 2.5
+    return n_closed == 4 and disputed < 0.1 * np.count_nonzero(inside) and bump.misfit < MAX_MISFIT
 
 
 def _without_overlap(patches: list[Patch]) -> list[Patch]:

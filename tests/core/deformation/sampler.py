@@ -124,10 +124,13 @@ class PipeScene:
         self, axis: LineAxis | ArcAxis, view: float, rng: np.random.Generator
     ) -> tuple[Array, NDArray[np.bool_]]:
         """Points that a station sees from far away at the clock angle `view`."""
-        # Uniform over the surface, thinned by the incidence, is uniform over the beam.
-        n = int(self.length * 2 * np.pi * self.radius / self.spacing**2 * 1.3)
-        s = rng.uniform(0, self.length, n)
-        theta = rng.uniform(0, 2 * np.pi, n)
+        # Rows of evenly spaced rays; a row sees the pipe at x = r sin(angle from the view).
+        rows = np.arange(rng.uniform(0, self.spacing), self.length, self.spacing)
+        n_across = int(2 * self.radius / self.spacing) + 1
+        x = self.spacing * (np.arange(n_across) + rng.uniform(0, 1, (len(rows), 1))) - self.radius
+        s = np.repeat(rows, n_across) + 0.1 * self.spacing * rng.normal(size=x.size)
+        inside = (np.abs(x.ravel()) < self.radius) & (s > 0) & (s < self.length)
+        s, theta = s[inside], view + np.arcsin(x.ravel()[inside] / self.radius)
         to_station = surface_points(axis, self.length / 2, 1.0, view) - axis.at(self.length / 2)
         tilt = rng.uniform(-0.4, 0.4)
         to_station = unit(to_station + tilt * axis.tangent(self.length / 2))
@@ -138,7 +141,7 @@ class PipeScene:
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         normal *= np.sign(np.sum(normal * (p - axis.at(s)), axis=1))[:, None]
         cos = normal @ to_station
-        lit = (cos > np.cos(self.arc / 2)) & (rng.uniform(size=n) < cos / 1.3)
+        lit = cos > np.cos(self.arc / 2)
         p, s = p[lit], s[lit]
         if self.sag is not None:
             up, _ = axis.frame(s)
