@@ -1,5 +1,6 @@
 """How well a result agrees with the truth of a simulated scan. Knows no detector."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -8,7 +9,8 @@ from numpy.typing import NDArray
 
 from pipecore.geometry import ArcAxis, Array, LineAxis
 from pipecore.simulate import TrueDeformation, TrueElement, Truth
-from pipecore.types import Deformation, DeformationKind, Element, ElementKind, Result
+from pipecore.types import Deformation, Element, ElementKind, Result
+from tests.scoring_deformations import WHOLE_AXIS, DeformationMatch, match_deformations
 
 STEP = 0.01
 """Axes are compared every so many metres."""
@@ -29,45 +31,15 @@ class Stretch:
     start: float
     end: float
 
+    @property
+    def length(self) -> float:
+        return self.end - self.start
+
     def __str__(self) -> str:
         return (
             f"{self.kind} {self.element_id} r {1e3 * self.radius:.0f} mm: "
             f"{self.start:.2f}–{self.end:.2f} m"
         )
-
-
-@dataclass(frozen=True)
-class DeformationMatch:
-    """A true deformation with the reported one that stands for it."""
-
-    true: TrueDeformation
-    reported: Deformation
-
-    @property
-    def is_kind_right(self) -> bool:
-        return self.true.kind == self.reported.kind
-
-    @property
-    def depth_error(self) -> float:
-        return self.reported.depth - self.true.depth
-
-    @property
-    def length_ratio(self) -> float:
-        """Reported over true length of the footprint."""
-        return self.reported.length / self.true.length
-
-    @property
-    def width_ratio(self) -> float:
-        return self.reported.width / self.true.width
-
-    @property
-    def position_error(self) -> float:
-        """Distance of the peaks, metres."""
-        return float(np.linalg.norm(self.reported.peak - self.true.peak))
-
-    @property
-    def ovality_error(self) -> float:
-        return self.reported.ovality - self.true.ovality
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +53,13 @@ class Score:
     precision : float
         Share of the reported axis length (gaps left out) that is real.
     visible_length, reported_length : float
+    doubled_length : float
+        Axis length that two reported elements claim; it counts in the precision twice.
     kinds_right, kinds_judged : dict
-        Numbers of visible true elements by kind: those whose main reported element has
-        their kind, and all. One not found is not right.
+        Numbers of visible true elements by kind: those of which at least half is claimed
+        by one reported element of their kind, and all. One not found is not right.
     radius_errors : dict
-        Reported less true radius by true element, where its main reported element has
-        its kind.
+        Reported less true radius by true element that has the right kind.
     axis_errors : ndarray
         Distances between true and reported axes at all matched samples; elements with a
         bow or a kink are left out.
@@ -104,6 +77,7 @@ class Score:
     precision: float
     visible_length: float
     reported_length: float
+    doubled_length: float
     kinds_right: dict[ElementKind, int]
     kinds_judged: dict[ElementKind, int]
     radius_errors: dict[int, float]
@@ -139,7 +113,8 @@ class Score:
         )
         lines = [
             f"recall {self.recall:.3f} of {self.visible_length:.1f} m, "
-            f"precision {self.precision:.3f} of {self.reported_length:.1f} m",
+            f"precision {self.precision:.3f} of {self.reported_length:.1f} m "
+            f"({self.doubled_length:.1f} m twice)",
             f"kinds {self.kind_share():.2f} ({kinds})",
             f"radius: median {1e3 * self.median_radius_error:.2f} mm, "
             f"worst {1e3 * self.worst_radius_error:.2f} mm; "
@@ -201,90 +176,136 @@ def score(
     """
     shift = result.origin - truth.origin
     reported = [_moved(e, shift) for e in result.elements]
-    true = list(truth.elements)
-    through = [_pipe_through(f, true) for f in true if f.kind is ElementKind.FLANGE]
-    through_of = {f.element_id: f for f in through if f is not None}
+    truths = _true_axes(truth)
+    findings = [_find(t, reported, np.deg2rad(min_arc_deg)) for t in truths]
+    claims = [_check(r, truths, reported) for r in reported]
 
-    n_found = n_visible = 0.0
-    missed: list[Stretch] = []
-    kinds_right: dict[ElementKind, int] = {}
-    kinds_judged: dict[ElementKind, int] = {}
-    radius_errors: dict[int, float] = {}
-    bend_radius_errors: dict[int, float] = {}
-    axis_errors = []
-    displaced = {
-        d.element_id
-        for d in truth.deformations
-        if d.kind in (DeformationKind.BOW, DeformationKind.KINK)
-    }
-    for element in true:
-        chainage, weight = _samples(element)
-        is_visible = element.is_visible(chainage, np.deg2rad(min_arc_deg))
-        matches = np.array([_matches(element, chainage, r) for r in reported], dtype=np.bool_)
-        matches = matches.reshape(len(reported), len(chainage))
-        is_found = matches.any(axis=0)
-        if element.element_id in through_of:
-            pipe = through_of[element.element_id]
-            for r in reported:
-                is_found |= _matches(pipe, chainage, r)
-        n_visible += weight * is_visible.sum()
-        n_found += weight * (is_visible & is_found).sum()
-        missed += _stretches(element, chainage, weight, is_visible & ~is_found)
-
-        shortest = 0.1 if element.kind is ElementKind.CYLINDER else 0.5 * element.axis.length
-        if weight * is_visible.sum() < shortest:
-            continue
-        kinds_judged[element.kind] = kinds_judged.get(element.kind, 0) + 1
-        n_matched = (matches & is_visible).sum(axis=1)
-        if not n_matched.any():
-            continue
-        # Of elements that match as much, one of the right kind is the one meant.
-        main = max(
-            range(len(reported)), key=lambda i: (n_matched[i], reported[i].kind is element.kind)
-        )
-        rows = matches[main] & is_visible
-        if element.element_id not in displaced and element.kind is not ElementKind.SPHERE:
-            axis_errors.append(
-                reported[main].axis.pipe_coordinates(element.axis.at(chainage))[1][rows]
-            )
-        if reported[main].kind is not element.kind or n_matched[main] < 0.5 * is_visible.sum():
-            continue
-        kinds_right[element.kind] = kinds_right.get(element.kind, 0) + 1
-        radius_errors[element.element_id] = float(
-            np.median(_radius_difference(element, chainage[rows], reported[main]))
-        )
-        if isinstance(element.axis, ArcAxis) and isinstance(reported[main].axis, ArcAxis):
-            bend_radius_errors[element.element_id] = (
-                reported[main].axis.bend_radius / element.axis.bend_radius - 1
-            )
-
-    n_real = n_reported = 0.0
-    false: list[Stretch] = []
-    for r in reported:
-        chainage, weight = _samples(r)
-        is_claimed = np.ones(len(chainage), dtype=np.bool_)
-        for start, end in r.gaps:
-            is_claimed &= (chainage < start) | (chainage > end)
-        is_real = np.zeros(len(chainage), dtype=np.bool_)
-        for element in [*true, *through_of.values()]:
-            is_real |= _matches(r, chainage, element)
-        n_reported += weight * is_claimed.sum()
-        n_real += weight * (is_claimed & is_real).sum()
-        false += _stretches(r, chainage, weight, is_claimed & ~is_real)
-
+    visible_length = sum(f.visible_length for f in findings)
+    reported_length = sum(c.length for c in claims)
+    judged = [f for f in findings if f.is_judged]
+    right = [f for f in judged if f.main is not None and f.main.kind is f.element.kind]
     return Score(
-        n_found / n_visible if n_visible else np.nan,
-        n_real / n_reported if n_reported else np.nan,
-        n_visible,
-        n_reported,
-        kinds_right,
-        kinds_judged,
-        radius_errors,
-        np.concatenate(axis_errors) if axis_errors else np.empty(0),
-        bend_radius_errors,
-        tuple(s for s in missed if s.end - s.start >= min_stretch),
-        tuple(s for s in false if s.end - s.start >= min_stretch),
-        **_match_deformations(result, truth, shift, min_depth, min_seen),
+        recall=_share(sum(f.found_length for f in findings), visible_length),
+        precision=_share(sum(c.real_length for c in claims), reported_length),
+        visible_length=visible_length,
+        reported_length=reported_length,
+        doubled_length=sum(c.doubled_length for c in claims) / 2,
+        kinds_right=dict(Counter(f.element.kind for f in right)),
+        kinds_judged=dict(Counter(f.element.kind for f in judged)),
+        radius_errors={f.element.element_id: f.radius_error for f in right},
+        axis_errors=np.concatenate([np.empty(0), *(f.axis_errors for f in findings)]),
+        bend_radius_errors={
+            f.element.element_id: f.bend_radius_error
+            for f in right
+            if f.element.kind is ElementKind.TORUS
+        },
+        missed=tuple(s for f in findings for s in f.missed if s.length >= min_stretch),
+        false=tuple(s for c in claims for s in c.false if s.length >= min_stretch),
+        **match_deformations(result, truth, shift, min_depth, min_seen),
+    )
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole else np.nan
+
+
+@dataclass(frozen=True)
+class _TrueAxis:
+    """A true element with what else counts as it."""
+
+    element: TrueElement
+    slack: float
+    """How far a bow or kink has moved the axis, metres."""
+    pipe_inside: TrueElement | None
+    """The pipe through a flange."""
+
+
+def _true_axes(truth: Truth) -> list[_TrueAxis]:
+    slack = {d.element_id: d.depth for d in truth.deformations if d.kind in WHOLE_AXIS}
+    return [
+        _TrueAxis(e, slack.get(e.element_id, 0.0), _pipe_through(e, truth.elements))
+        for e in truth.elements
+    ]
+
+
+@dataclass
+class _Finding:
+    """What was found of one true element."""
+
+    element: TrueElement
+    visible_length: float = 0.0
+    found_length: float = 0.0
+    missed: list[Stretch] = field(default_factory=list)
+    is_judged: bool = False
+    main: Element | None = None
+    """The reported element that stands for at least half of what is visible."""
+    radius_error: float = np.nan
+    bend_radius_error: float = np.nan
+    axis_errors: Array = field(default_factory=lambda: np.empty(0))
+
+
+def _find(true: _TrueAxis, reported: list[Element], min_arc: float) -> _Finding:
+    element = true.element
+    chainage, weight = _samples(element)
+    is_visible = element.is_visible(chainage, min_arc)
+    matches = [_matches(element, chainage, r, true.slack) for r in reported]
+    inside = []
+    if true.pipe_inside is not None:
+        inside = [_matches(true.pipe_inside, chainage, r) for r in reported]
+    is_found = np.any([np.zeros(len(chainage), dtype=np.bool_), *matches, *inside], axis=0)
+    finding = _Finding(
+        element,
+        float(weight * is_visible.sum()),
+        float(weight * (is_visible & is_found).sum()),
+        _stretches(element, chainage, weight, is_visible & ~is_found),
+    )
+    # Of a short stub or a sliver nobody can tell the kind.
+    needed = 0.1 if element.kind is ElementKind.CYLINDER else 0.5 * element.axis.length
+    finding.is_judged = finding.visible_length >= needed
+    counts = [int((m & is_visible).sum()) for m in matches]
+    candidates = [i for i, n in enumerate(counts) if n and n >= 0.5 * is_visible.sum()]
+    if not candidates:
+        return finding
+    i = max(candidates, key=lambda i: (reported[i].kind is element.kind, counts[i]))
+    finding.main = main = reported[i]
+    rows = chainage[matches[i] & is_visible]
+    finding.radius_error = float(np.median(_radius_difference(element, rows, main)))
+    if isinstance(element.axis, ArcAxis) and isinstance(main.axis, ArcAxis):
+        finding.bend_radius_error = main.axis.bend_radius / element.axis.bend_radius - 1
+    if not true.slack and element.kind is not ElementKind.SPHERE:
+        finding.axis_errors = main.axis.pipe_coordinates(element.axis.at(rows))[1]
+    return finding
+
+
+@dataclass
+class _Claim:
+    """What is real of one reported element."""
+
+    length: float
+    real_length: float
+    doubled_length: float
+    false: list[Stretch]
+
+
+def _check(claimed: Element, truths: list[_TrueAxis], reported: list[Element]) -> _Claim:
+    chainage, weight = _samples(claimed)
+    is_claimed = np.ones(len(chainage), dtype=np.bool_)
+    for start, end in claimed.gaps:
+        is_claimed &= (chainage < start) | (chainage > end)
+    is_real = np.zeros(len(chainage), dtype=np.bool_)
+    for true in truths:
+        is_real |= _matches(claimed, chainage, true.element, true.slack)
+        if true.pipe_inside is not None:
+            is_real |= _matches(claimed, chainage, true.pipe_inside)
+    is_doubled = np.zeros(len(chainage), dtype=np.bool_)
+    for other in reported:
+        if other is not claimed:
+            is_doubled |= _matches(claimed, chainage, other)
+    return _Claim(
+        float(weight * is_claimed.sum()),
+        float(weight * (is_claimed & is_real).sum()),
+        float(weight * (is_claimed & is_doubled).sum()),
+        _stretches(claimed, chainage, weight, is_claimed & ~is_real),
     )
 
 
@@ -304,8 +325,13 @@ def _samples(element: Element | TrueElement) -> tuple[Array, float]:
     return (np.arange(n_steps) + 0.5) * weight, weight
 
 
-def _matches(one: Element | TrueElement, chainage: Array, other: Element | TrueElement) -> Bools:
-    """Whether `one` at each chainage agrees with the axis and radius of `other`."""
+def _matches(
+    one: Element | TrueElement,
+    chainage: Array,
+    other: Element | TrueElement,
+    slack: float = 0.0,
+) -> Bools:
+    """Whether `one` agrees with the axis (by `slack` less strictly) and radius of `other`."""
     if one.kind is ElementKind.SPHERE and other.kind is ElementKind.SPHERE:
         is_near = np.linalg.norm(one.centre - other.centre) <= _tolerance(one.radius)
         is_same = is_near and abs(other.radius / one.radius - 1) <= MAX_RADIUS_RATIO
@@ -319,7 +345,7 @@ def _matches(one: Element | TrueElement, chainage: Array, other: Element | TrueE
     difference = _radius_difference(one, chainage, other)
     return np.asarray(
         is_beside
-        & (offset <= _tolerance(radius))
+        & (offset <= _tolerance(radius) + slack)
         & (cosine >= np.cos(MAX_ANGLE))
         & (np.abs(difference) <= MAX_RADIUS_RATIO * radius)
     )
@@ -340,9 +366,9 @@ def _radius_difference(
     return other.radius_at(along) - one.radius_at(chainage)
 
 
-def _pipe_through(flange: TrueElement, elements: list[TrueElement]) -> TrueElement | None:
+def _pipe_through(flange: TrueElement, elements: tuple[TrueElement, ...]) -> TrueElement | None:
     """The pipe inside a flange, as a neighbour in its run has it."""
-    for e in elements:
+    for e in elements if flange.kind is ElementKind.FLANGE else ():
         if e.run_id != flange.run_id or e.kind is ElementKind.FLANGE:
             continue
         if np.linalg.norm(e.axis.end - flange.axis.start) < 1e-6:
@@ -369,67 +395,3 @@ def _stretches(
         )
         for a, b in zip(edges[::2], edges[1::2], strict=True)
     ]
-
-
-@dataclass
-class _Claims:
-    deformations: list[DeformationMatch] = field(default_factory=list)
-    false: list[Deformation] = field(default_factory=list)
-    duplicates: list[Deformation] = field(default_factory=list)
-
-
-WHOLE_AXIS = (DeformationKind.BOW, DeformationKind.KINK)
-
-
-def _match_deformations(
-    result: Result, truth: Truth, shift: Array, min_depth: float, min_seen: float
-) -> dict[str, tuple[object, ...]]:
-    """Match each true deformation to the nearest reported one on it, of its kind if any is."""
-    reported = [replace(d, peak=d.peak + shift) for d in result.deformations]
-    claims = _Claims()
-    pairs = [
-        (t.kind is not d.kind, float(np.linalg.norm(t.peak - d.peak)), i, j)
-        for i, t in enumerate(truth.deformations)
-        for j, d in enumerate(reported)
-        if _is_on(d, t, truth.element(t.element_id))
-    ]
-    true_done: set[int] = set()
-    reported_done: set[int] = set()
-    for _, _, i, j in sorted(pairs):
-        if i in true_done or j in reported_done:
-            continue
-        true_done.add(i)
-        reported_done.add(j)
-        claims.deformations.append(DeformationMatch(truth.deformations[i], reported[j]))
-    on_something = {j for _, _, _, j in pairs}
-    for j, d in enumerate(reported):
-        if j not in reported_done:
-            (claims.duplicates if j in on_something else claims.false).append(d)
-    missed = [
-        t
-        for i, t in enumerate(truth.deformations)
-        if i not in true_done and t.depth >= min_depth and t.seen >= min_seen
-    ]
-    return {
-        "deformations": tuple(sorted(claims.deformations, key=lambda m: m.true.deformation_id)),
-        "missed_deformations": tuple(missed),
-        "false_deformations": tuple(claims.false),
-        "duplicate_deformations": tuple(claims.duplicates),
-    }
-
-
-def _is_on(reported: Deformation, true: TrueDeformation, element: TrueElement) -> bool:
-    """Whether a reported peak lies on the footprint of a true deformation, or just beside."""
-    if (reported.kind in WHOLE_AXIS) != (true.kind in WHOLE_AXIS):
-        return False
-    (chainage,), (offset,), (clock,) = element.axis.pipe_coordinates(reported.peak[None])
-    radius = float(element.radius_at(true.chainage))
-    margin = max(0.02, 0.25 * true.length)
-    if not true.chainage_start - margin <= chainage <= true.chainage_end + margin:
-        return False
-    if abs(offset - radius) > 0.5 * radius:
-        return False
-    if true.kind not in (DeformationKind.DENT, DeformationKind.BULGE):
-        return True
-    around = radius * abs(np.mod(clock - true.clock + np.pi, 2 * np.pi) - np.pi)
-    return bool(around <= true.width / 2 + max(0.02, 0.25 * true.width))

@@ -92,7 +92,7 @@ def random_scene(
     positions = planner.find_stations(stations)
     runs = tuple(planner.room.runs)
     if deformed:
-        runs = deform(runs, planner.is_free, planner.rng)
+        runs = deform(runs, planner.is_free, positions, planner.rng)
     scene = Scene(
         runs,
         positions,

@@ -20,11 +20,13 @@ def with_coverage(
         e.element_id: np.asarray(xyz[order[bounds[i] : bounds[i + 1]]], dtype=np.float64)
         for i, e in enumerate(truth.elements)
     }
+    covered = replace(
+        truth, elements=tuple(_covered(e, points[e.element_id], spacing) for e in truth.elements)
+    )
     return replace(
-        truth,
-        elements=tuple(_covered(e, points[e.element_id], spacing) for e in truth.elements),
+        covered,
         deformations=tuple(
-            _seen(d, truth.element(d.element_id), points[d.element_id], spacing)
+            _seen(d, covered.element(d.element_id), points[d.element_id], spacing)
             for d in truth.deformations
         ),
     )
@@ -60,6 +62,10 @@ def _seen(
     deformation: TrueDeformation, element: TrueElement, points: Array, spacing: float
 ) -> TrueDeformation:
     """Count the cells of the deformation's footprint that hold a point."""
+    if deformation.kind in (DeformationKind.BOW, DeformationKind.KINK):
+        # They show wherever the axis does.
+        is_visible = element.is_visible(np.linspace(0.0, element.axis.length, 200))
+        return replace(deformation, seen=float(is_visible.mean()), n_points=len(points))
     chainage, _, clock = element.axis.pipe_coordinates(points)
     radius = float(element.radius_at(deformation.chainage))
     along = (chainage - deformation.chainage_start) / deformation.length

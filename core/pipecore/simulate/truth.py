@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pipecore.errors import ReadError
 from pipecore.geometry import ArcAxis, Array, LineAxis
@@ -64,8 +65,12 @@ class TrueElement:
     def visible_ranges(
         self, min_arc: float = MIN_ARC, min_points: int = MIN_POINTS
     ) -> tuple[tuple[float, float], ...]:
-        """Chainage ranges of which at least `min_arc` and `min_points` per step were hit."""
-        is_seen = (self.arc_seen >= min_arc) & (self.points_seen >= min_points)
+        """Chainage ranges of which at least `min_arc` and `min_points` per step were hit.
+
+        Points are averaged over three steps, as rows of points do not keep step.
+        """
+        near = uniform_filter1d(self.points_seen.astype(np.float64), 3, mode="nearest")
+        is_seen = (self.arc_seen >= min_arc) & (near >= min_points) & (self.points_seen > 0)
         steps = np.flatnonzero(np.diff(np.r_[0, is_seen.astype(np.int8), 0]))
         step = self.axis.length / max(len(is_seen), 1)
         return tuple(
@@ -85,7 +90,8 @@ class TrueDeformation:
     """A deformation as it was built; the fields are those of `pipecore.types.Deformation`.
 
     `length` and `width` are the whole footprint's. `shape` is a `DentShape`, or "".
-    `seen` is the share of its area that points fell on, `n_points` their number.
+    `seen` is the share of its area that points fell on (of its axis that is visible, for a
+    bow or kink), `n_points` their number.
     """
 
     deformation_id: int

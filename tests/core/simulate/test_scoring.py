@@ -189,6 +189,27 @@ def test_that_wrong_radii_and_directions_are_not_real(simulated: Scan) -> None:
     assert s.precision == pytest.approx(1 - 0.6 / s.reported_length)
 
 
+def test_that_a_bowed_pipe_is_found_by_its_chord_and_by_its_bow(simulated: Scan) -> None:
+    result = perfect(simulated)
+    bowed = next(d.element_id for d in result.deformations if d.kind is DeformationKind.BOW)
+    axis = result.element(bowed).axis
+    _, right = axis.frame(0.0)
+    # The rule alone allows 9 mm here.
+    for offset in (0.0, 0.01, 0.018):
+        moved = with_element(result, bowed, axis=replace(axis, start=axis.start + offset * right))
+        s = score(moved, simulated.truth)
+        assert s.recall == s.precision == 1.0
+
+
+def test_that_telling_a_pipe_twice_is_told(simulated: Scan) -> None:
+    result = perfect(simulated)
+    assert score(result, simulated.truth).doubled_length < 0.05
+    twice = replace(result, elements=(*result.elements, result.element(3)))
+    s = score(twice, simulated.truth)
+    assert s.precision == 1.0
+    assert s.doubled_length == pytest.approx(1.0, abs=0.05)
+
+
 def test_that_a_gap_is_no_claim_and_prolonging_a_pipe_is(simulated: Scan) -> None:
     result = perfect(simulated)
     axis = result.element(8).axis
