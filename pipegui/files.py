@@ -65,7 +65,10 @@ def _vacant(folder: Path) -> Path:
 def recent(settings: QSettings) -> list[Path]:
     """Return the scans opened last that are still there, the latest first."""
     stored = settings.value("files/recent", [])
-    names = [stored] if isinstance(stored, str) else list(stored or [])
+    # A list of one comes back as plain text.
+    names = [stored] if isinstance(stored, str) else stored
+    if not isinstance(names, list):
+        return []
     return [path for path in map(Path, names) if path.is_file()]
 
 

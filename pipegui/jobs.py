@@ -85,7 +85,7 @@ class Jobs(QObject):
         self._waiting: deque[_Request] = deque()
         self._running: _Request | None = None
         self.worker = Worker(self)
-        self.worker.event.connect(self._take)
+        self.worker.happened.connect(self._take)
 
     @property
     def is_busy(self) -> bool:
@@ -126,7 +126,7 @@ class Jobs(QObject):
     def close(self) -> None:
         """Stop everything and wait for the worker's thread."""
         self._waiting.clear()
-        self.worker.event.disconnect(self._take)
+        self.worker.happened.disconnect(self._take)
         self.worker.close()
 
     def _request(self, request: _Request) -> None:

@@ -102,12 +102,13 @@ def _same_element(element: Element, result: Result) -> Element | None:
     middle = _middle(element)
     best, least = None, 0.5
     for candidate in result.elements:
-        chainage, off_axis, _ = candidate.axis.pipe_coordinates(middle[None])
-        beyond = max(-chainage[0], chainage[0] - candidate.axis.length, 0.0)
         if candidate.kind is ElementKind.SPHERE:
-            off_axis, beyond = [np.linalg.norm(middle - candidate.centre)], 0.0
-        difference = abs(candidate.radius - element.radius) + float(off_axis[0]) + beyond
-        difference /= element.radius
+            offset = float(np.linalg.norm(middle - candidate.centre))
+        else:
+            chainage, off_axis, _ = candidate.axis.pipe_coordinates(middle[None])
+            beyond = max(-chainage[0], chainage[0] - candidate.axis.length, 0.0)
+            offset = float(off_axis[0]) + beyond
+        difference = (abs(candidate.radius - element.radius) + offset) / element.radius
         if difference < least:
             best, least = candidate, difference
     return best

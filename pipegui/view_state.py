@@ -358,7 +358,7 @@ def _surface(
     """Chainage, clock, deviation and index in the cloud of one element's points."""
     index = np.flatnonzero(result.element_id == element_id)
     axis = result.element(element_id).axis
-    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index])
+    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index].astype(np.float64))
     return chainage, clock, result.deviation[index].astype(np.float64), index
 
 

@@ -120,7 +120,7 @@ class Worker(QObject):
     threads use it.
     """
 
-    event = Signal(object)
+    happened = Signal(object)
     """An `Event`, delivered in the window's thread."""
     _posted = Signal(object)
 
@@ -146,7 +146,7 @@ class Worker(QObject):
         job = next(self._numbers)
         self._current, self._progress = job, JobProgress(job, self._posted.emit)
         self._unended.add(job)
-        self.event.emit(Started(job, title))
+        self.happened.emit(Started(job, title))
         self._jobs.put((self._progress, job, work))
         return job
 
@@ -175,17 +175,17 @@ class Worker(QObject):
         if event.job not in self._unended:
             return
         is_current = event.job == self._current
-        is_wanted = is_current and self._progress is not None
-        is_wanted = is_wanted and not self._progress.is_cancelled.is_set()
+        is_cancelled = self._progress is None or self._progress.is_cancelled.is_set()
+        is_wanted = is_current and not is_cancelled
         if not isinstance(event, Finished | Failed | Cancelled):
             if is_wanted:
-                self.event.emit(event)
+                self.happened.emit(event)
             return
         self._unended.remove(event.job)
         if is_current:
             self._current, self._progress = 0, None
         # A value that comes after the cancel was asked for is not wanted any more.
-        self.event.emit(event if is_wanted else Cancelled(event.job))
+        self.happened.emit(event if is_wanted else Cancelled(event.job))
 
 
 def _end_of(progress: JobProgress, job: int, work: Work) -> Event:

@@ -122,7 +122,8 @@ class StacksPanel(QWidget):
             own = dict(enumerate(state.settings.directions))
             for stack, n_profiles in zip(state.stacks, state.n_profiles, strict=True):
                 match = next((i for i, d in own.items() if _is_of(stack, d)), None)
-                own.pop(match, None)
+                if match is not None:
+                    del own[match]
                 self._add_cut(stack, n_profiles, match, stack.stack_id == state.shown_stack)
             default = state.settings.width_mm
             for index, direction in own.items():

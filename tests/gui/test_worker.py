@@ -15,7 +15,7 @@ ENDS = (Finished, Failed, Cancelled)
 def worker(qtbot):
     worker = Worker()
     worker.events = []
-    worker.event.connect(worker.events.append)
+    worker.happened.connect(worker.events.append)
     yield worker
     assert worker.close()
 
