@@ -1,0 +1,1 @@
+"""The 3D view: points, axes, ellipses, surfaces, labels, camera and picking."""

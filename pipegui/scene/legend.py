@@ -1,0 +1,87 @@
+"""What the colours of the points mean, in words and numbers. Qt- and VTK-free."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipecore.report.format import MINUS
+from pipecore.types import ElementKind, PointCloud, Result
+from pipegui.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours
+from pipegui.document import ColourBy, ViewOptions
+from pipegui.scene.colouring import KIND_COLOUR, PROFILE_COLOURS, effective, height_range
+
+Swatch = tuple[tuple[int, int, int], str]
+
+KIND_NAME = {
+    ElementKind.CYLINDER: "Pipe",
+    ElementKind.TORUS: "Bend",
+    ElementKind.CONE: "Reducer",
+    ElementKind.SPHERE: "Sphere",
+    ElementKind.FLANGE: "Flange",
+    ElementKind.TEE: "Tee",
+    ElementKind.OTHER: "Other",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Legend:
+    """A scale with ticks, or a list of swatches.
+
+    Parameters
+    ----------
+    title : str
+    scale : ndarray of uint8, shape (n, 3), optional
+        Colours from the low to the high end.
+    ticks : tuple of (float, str)
+        Place on the scale (0 … 1) and its text.
+    swatches : tuple of ((r, g, b), str)
+    """
+
+    title: str
+    scale: Colours | None = None
+    ticks: tuple[tuple[float, str], ...] = ()
+    swatches: tuple[Swatch, ...] = ()
+
+
+def make_legend(cloud: PointCloud, result: Result | None, view: ViewOptions) -> Legend | None:
+    """Return what the colours mean, or None where they speak for themselves."""
+    colour_by = effective(view.colour_by, cloud, result)
+    if colour_by is ColourBy.DEVIATION:
+        return Legend("Deviation, mm", DEVIATION, _deviation_ticks(view.deviation_limit_mm))
+    if colour_by is ColourBy.HEIGHT:
+        low, high = (h + float(cloud.origin[2]) for h in height_range(cloud))
+        ticks = tuple((s, f"{low + s * (high - low):.2f}") for s in (0.0, 0.5, 1.0))
+        return Legend("Height, m", HEIGHT, ticks)
+    if colour_by is ColourBy.INTENSITY:
+        return Legend("Intensity", INTENSITY, ((0.0, "low"), (1.0, "high")))
+    if colour_by is ColourBy.KIND:
+        kinds = {e.kind for e in result.elements}
+        return Legend("Kind", swatches=tuple(_swatch(k) for k in KIND_COLOUR if k in kinds))
+    if colour_by is ColourBy.PROFILE:
+        return _profile_legend(result, view.shown_stack)
+    return None
+
+
+def _deviation_ticks(limit_mm: float) -> tuple[tuple[float, str], ...]:
+    signs = (MINUS, MINUS, "", "+", "+")
+    shares = np.linspace(0, 1, 5).tolist()
+    return tuple(
+        (share, f"{sign}{abs(2 * share - 1) * limit_mm:g}")
+        for share, sign in zip(shares, signs, strict=True)
+    )
+
+
+def _swatch(kind: ElementKind) -> Swatch:
+    red, green, blue = KIND_COLOUR[kind].tolist()
+    return (red, green, blue), KIND_NAME[kind]
+
+
+def _profile_legend(result: Result, stack_id: int) -> Legend:
+    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
+    if stack is None:
+        return Legend("No stack is shown: tick one in the stacks panel.")
+    even, odd = (tuple(c) for c in PROFILE_COLOURS.tolist())
+    return Legend(
+        f"{stack.name or f'Stack {stack.stack_id}'}, {1000 * stack.width:.0f} mm wide",
+        swatches=((even, "even profiles"), (odd, "odd profiles")),
+    )

@@ -1,0 +1,92 @@
+"""Lines and surfaces of elements and profiles, many merged into one mesh. No window here."""
+
+import numpy as np
+import pyvista as pv
+
+from pipecore.geometry import ArcAxis, Array, surface_points
+from pipecore.types import Element, ElementKind, Profiles
+
+N_AROUND = 48
+N_ALONG_BEND = 24
+
+
+def axis_lines(elements: tuple[Element, ...]) -> pv.PolyData:
+    """Return the axes of `elements`, straight or curved."""
+    return _polylines([e.axis.at(_chainages(e)) for e in elements])
+
+
+def ellipse_lines(profiles: Profiles) -> pv.PolyData:
+    """Return the ellipses of `profiles`."""
+    return _polylines(list(ellipses(profiles)))
+
+
+def ellipses(profiles: Profiles, n_around: int = N_AROUND) -> Array:
+    """Points along the ellipses of `profiles`, closed, shape (m, n_around + 1, 3)."""
+    t = np.linspace(0, 2 * np.pi, n_around + 1)[None, :, None]
+    minor_direction = np.cross(profiles.normal, profiles.major_direction)
+    major = (profiles.semi_major[:, None] * profiles.major_direction)[:, None, :]
+    minor = (profiles.semi_minor[:, None] * minor_direction)[:, None, :]
+    points = profiles.centre[:, None, :] + np.cos(t) * major + np.sin(t) * minor
+    return points[np.isfinite(points).all(axis=(1, 2))]
+
+
+def end_rings(element: Element) -> pv.PolyData:
+    """Return the circles at both ends of an element, or a sphere's equator."""
+    clock = np.linspace(0, 2 * np.pi, N_AROUND + 1)
+    if element.kind is ElementKind.SPHERE:
+        around = np.stack([np.cos(clock), np.sin(clock), 0 * clock], axis=1)
+        return _polylines([element.centre + element.radius * around])
+    ends = (0.0, element.axis.length)
+    return _polylines([surface_points(element.axis, s, element.radius_at(s), clock) for s in ends])
+
+
+def surfaces(elements: tuple[Element, ...]) -> pv.PolyData:
+    """Return the fitted surfaces of `elements` with their normals."""
+    meshes = [_surface(e) for e in elements]
+    return pv.merge(meshes) if meshes else pv.PolyData()
+
+
+def outline(elements: tuple[Element, ...]) -> Array:
+    """Points that surround `elements`: what has to be in view to see them, shape (n, 3)."""
+    points = [np.empty((0, 3))]
+    for e in elements:
+        if e.kind is ElementKind.SPHERE:
+            points.append(e.centre + e.radius * np.vstack([np.eye(3), -np.eye(3)]))
+            continue
+        s, clock = np.meshgrid(_chainages(e), np.linspace(0, 2 * np.pi, 8, endpoint=False))
+        s, clock = s.ravel(), clock.ravel()
+        points.append(surface_points(e.axis, s, e.radius_at(s), clock))
+    return np.concatenate(points)
+
+
+def _chainages(element: Element) -> Array:
+    n_along = N_ALONG_BEND if isinstance(element.axis, ArcAxis) else 2
+    return np.linspace(0, element.axis.length, n_along)
+
+
+def _polylines(curves: list[Array]) -> pv.PolyData:
+    if not curves:
+        return pv.PolyData()
+    lengths = [len(c) for c in curves]
+    starts = np.cumsum([0, *lengths[:-1]])
+    cells = [np.r_[n, start : start + n] for n, start in zip(lengths, starts, strict=True)]
+    return pv.PolyData(np.concatenate(curves).astype(np.float32), lines=np.concatenate(cells))
+
+
+def _surface(element: Element) -> pv.PolyData:
+    if element.kind is ElementKind.SPHERE:
+        return pv.Sphere(element.radius, element.centre, theta_resolution=48, phi_resolution=24)
+    s, clock = np.meshgrid(_chainages(element), np.linspace(0, 2 * np.pi, N_AROUND + 1))
+    points = surface_points(element.axis, s.ravel(), element.radius_at(s.ravel()), clock.ravel())
+    normals = points - element.axis.at(s.ravel())
+    rows, columns = s.shape
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    quads = np.stack([corner, corner + 1, corner + columns + 1, corner + columns], axis=1)
+    mesh = pv.PolyData(
+        points.astype(np.float32),
+        faces=np.column_stack([np.full(len(quads), 4), quads]).ravel(),
+    )
+    mesh.point_data["Normals"] = (
+        normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-9)[:, None]
+    ).astype(np.float32)
+    return mesh
