@@ -26,6 +26,7 @@ from pipecore.types import (
     PointCloud,
     Profiles,
     Result,
+    Verdict,
 )
 from pipegui.document import Scan, Selection
 from pipegui.view_state import PropertiesState, stack_name
@@ -41,6 +42,7 @@ class Property:
     text: str
     plain: str = ""
     hint: str = ""
+    verdict: Verdict | None = None
 
     @property
     def is_measurable(self) -> bool:
@@ -214,7 +216,9 @@ def _of_deformation(
     deformation: Deformation, element: Element, result: Result
 ) -> Iterator[Property]:
     share = 1 / outside_diameter(element)
-    yield Property("Verdict", str(deformation.verdict), hint=f"Rule: {deformation.rule}")
+    verdict = deformation.verdict
+    rule = f"By the rule “{deformation.rule}”"
+    yield Property("Verdict", str(verdict), str(verdict), hint=rule, verdict=verdict)
     yield _measure("Depth", deformation.depth, deformation.depth_sd)
     yield _measure("Depth of OD", deformation.depth * share, deformation.depth_sd * share, unit="%")
     size = f"{1000 * deformation.length:.0f} × {1000 * deformation.width:.0f}"

@@ -53,6 +53,7 @@ class ToolBar(QToolBar):
         self._limit_label = self.addWidget(QLabel("Limits"))
         self._limit_action = self.addWidget(self.limit)
         self.addSeparator()
+        self.addWidget(QLabel("Deformations"))
         for name in ("previous_deformation", "next_deformation"):
             self.addAction(actions[name])
 

@@ -59,6 +59,8 @@ class PropertiesPanel(QWidget):
             item.setForeground(0, theme.colour("muted"))
             item.setText(1, line.text)
             item.setData(1, Qt.ItemDataRole.UserRole, line.plain or line.text)
+            if line.verdict is not None:
+                item.setIcon(1, theme.verdict_icon(line.verdict))
             if not line.is_measurable:
                 item.setForeground(1, theme.colour("muted"))
             item.setToolTip(0, line.hint)

@@ -1,14 +1,16 @@
 """The status bar: what is looked at, where the cursor is, how far the work is."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QStatusBar, QToolButton, QWidget
 
 from pipegui import describe, theme
 from pipegui.view_state import WindowState
 from pipegui.worker import Progressed
 
-UNTIMED = 1000
-"""Steps of the progress bar."""
+STEPS = 1000
+"""Of the progress bar."""
+SILENT_MS = 3000
+"""After this long without a sign the bar only shows that work goes on."""
 
 
 class StatusBar(QStatusBar):
@@ -40,6 +42,10 @@ class StatusBar(QStatusBar):
         self.addWidget(self.cursor_position)
         self.addPermanentWidget(self._job_box)
         self._job_box.hide()
+        self._silence = QTimer(self)
+        self._silence.setSingleShot(True)
+        self._silence.setInterval(SILENT_MS)
+        self._silence.timeout.connect(self._show_working)
 
     def apply(self, state: WindowState) -> None:
         """Show which scan is looked at."""
@@ -58,27 +64,38 @@ class StatusBar(QStatusBar):
         self.bar.setRange(0, 0)
         self.cancel.setEnabled(True)
         self._job_box.show()
+        self._silence.start()
 
     def progress(self, event: Progressed) -> None:
         """Show how far a job is."""
         if not event.stage or not self.cancel.isEnabled():
             return
-        self.bar.setRange(0, UNTIMED)
-        self.bar.setValue(round(UNTIMED * event.fraction))
+        self.bar.setRange(0, STEPS)
+        self.bar.setValue(round(STEPS * event.fraction))
         parts = [f"{self._title}: {event.stage} {100 * event.fraction:.0f} %"]
         if event.seconds_left is not None:
             parts.append(_time_left(event.seconds_left))
         self.job.setText(" · ".join(parts))
+        self._silence.start()
+
+    def _show_working(self) -> None:
+        """Show that the work goes on though it says nothing, as when kernels are compiled."""
+        self.bar.setRange(0, 0)
+        self.job.setText(
+            f"{self.job.text().split(' · ')[0]} · working (the first run takes longer)"
+        )
 
     def show_cancelling(self) -> None:
         """Answer a cancel at once, before the work has stopped."""
         if self._job_box.isVisible():
             self.cancel.setEnabled(False)
             self.job.setText("Cancelling…")
+            self._silence.stop()
 
     def end(self) -> None:
         """Show that nothing runs any more."""
         self._job_box.hide()
+        self._silence.stop()
 
 
 def _time_left(seconds: float) -> str:

@@ -470,3 +470,22 @@ def test_that_all_is_usable_at_1366_by_768(detected):
     assert detected.parts.scene.height() > 300
     verdict = detected.panels.table.view.visualRect(detected.panels.table.proxy.index(0, 10))
     assert detected.panels.table.view.viewport().rect().contains(verdict)
+
+
+def test_that_silent_work_is_seen_to_go_on(make_window, qtbot, monkeypatch):
+    monkeypatch.setattr("pipegui.panels.status.SILENT_MS", 100)
+
+    def compile_first(cloud, settings, progress):
+        progress.update("thinning", 0.0)
+        time.sleep(0.5)
+        progress.update("thinning", 1.0)
+        time.sleep(0.05)
+        return make_result()
+
+    window = make_window(detect=compile_first)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    qtbot.waitUntil(lambda: "working" in window.status.job.text())
+    assert window.status.bar.maximum() == 0
+    qtbot.waitUntil(lambda: window.document.result is not None)
