@@ -22,7 +22,7 @@ from pipegui.panels.project_tree import NodeKind
 from pipegui.panels.status import StatusBar
 from pipegui.parts import Parts
 from pipegui.toolbar import ToolBar
-from pipegui.view_state import ViewState, resolve
+from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
 
 VIEW_OPTIONS = ("show_points", "show_axes", "show_ellipses", "show_surfaces", "show_labels", "fly")
 
@@ -169,6 +169,9 @@ class MainWindow(QMainWindow):
 
     def detect(self) -> None:
         """Detect on the active scan in the background."""
+        # A number still being typed counts: it becomes a setting when its field is left.
+        if (field := self.focusWidget()) is not None:
+            field.clearFocus()
         if self.document.scan is not None:
             self.jobs.detect(self.document.scan.cloud, self.document.settings)
 
@@ -230,21 +233,27 @@ class MainWindow(QMainWindow):
             "stacks": panels.stacks.apply,
             "settings": panels.settings.apply,
             "table": panels.table.apply,
-            "properties": panels.properties.apply,
+            "properties": self._apply_properties,
             "radius_plot": parts.radius_plot.apply,
             "section": parts.section.apply,
             "map": parts.map.apply,
             "scene": parts.scene.apply,
         }
 
-    def _apply_window(self, state: Any) -> None:
+    def _apply_window(self, state: WindowState) -> None:
         has_scan = state.scan is not None
-        self.setWindowTitle(f"{state.scan.name} – PipeGUI" if has_scan else "PipeGUI")
+        self.setWindowTitle(f"{state.scan.name} – PipeGUI" if state.scan else "PipeGUI")
         self.centre.setCurrentWidget(self.parts.scene if has_scan else self.panels.welcome)
         self.tool_bar.apply(state)
         self.status.apply(state)
         for name in VIEW_OPTIONS:
             self.actions_.set_checked(name, getattr(state.view, name))
+
+    def _apply_properties(self, state: PropertiesState) -> None:
+        self.panels.properties.apply(state)
+        result = state.scan.result if state.scan else None
+        title = describe.title(result, state.selection)
+        self.panels.docks["Element"].setWindowTitle(title or "Element")
 
     def _update_actions(self) -> None:
         document, busy = self.document, self.jobs.is_busy

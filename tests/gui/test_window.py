@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QMimeData, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QPushButton
+from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog, QPushButton
 
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
@@ -489,3 +489,30 @@ def test_that_silent_work_is_seen_to_go_on(make_window, qtbot, monkeypatch):
     qtbot.waitUntil(lambda: "working" in window.status.job.text())
     assert window.status.bar.maximum() == 0
     qtbot.waitUntil(lambda: window.document.result is not None)
+
+
+def test_that_a_number_still_being_typed_counts_for_the_detection(make_window, qtbot):
+    used = []
+
+    def detect(cloud, settings, progress):
+        used.append(settings.elements.min_radius_mm)
+        return make_result()
+
+    window = make_window(detect=detect)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.panels.docks["Settings"].raise_()
+    field = window.panels.settings.findChild(QDoubleSpinBox, "elements.min_radius_mm")
+    field.setFocus()
+    field.selectAll()
+    qtbot.keyClicks(field, "40")
+    press(qtbot, window, "detect")
+    qtbot.waitUntil(lambda: window.document.result is not None)
+    assert used == [40.0]
+
+
+def test_that_the_plots_are_headed_by_what_they_show(detected):
+    dock = detected.panels.docks["Element"]
+    assert dock.windowTitle() == "Pipe 2 · dent 1"
+    detected.parts.scene.picked.emit(-1)
+    assert dock.windowTitle() == "Element"
