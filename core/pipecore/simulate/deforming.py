@@ -62,7 +62,7 @@ def random_deformation(
         start = float(rng.uniform(0.05 * length, 0.95 * length - extent))
         return Ovality(float(rng.uniform(0.03, 0.08)), clock_deg, start, start + extent)
     if kind is DeformationKind.BOW:
-        return Bow(float(rng.uniform(0.004, 0.012)) * length, clock_deg)
+        return Bow(min(float(rng.uniform(0.004, 0.012)) * length, 0.02), clock_deg)
     extents = 2 * radius * rng.uniform(0.5, 1.0, 2)
     extent = float(np.clip(extents[0], 0.08, 0.4 * length))
     width = float(np.clip(extents[1], 0.06, 2.5 * radius))

@@ -40,6 +40,8 @@ RACK_LENGTH = 6.0
 RACK_DEPTH = 3.0
 NEAR = 0.01
 """Pipes that nearly touch are this far apart, metres."""
+CLEAR = 0.03
+"""Free pipes, which may bulge and bow, keep this distance, metres."""
 
 PAINTS = ("galvanised", "steel", "stainless", "cladding", "blue", "green", "yellow", "grey")
 ALONG, ACROSS, UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
@@ -288,7 +290,7 @@ class _Planner:
     def add_risers(self) -> None:
         """Verticals from the floor with a flange at the foot, most of them turning off."""
         for _ in range(int(self.rng.integers(2, 5))):
-            self._try(self._riser, NEAR, free=True)
+            self._try(self._riser, CLEAR, free=True)
 
     def _riser(self) -> Run:
         size = self._size(300)
@@ -326,7 +328,7 @@ class _Planner:
     def add_oblique_pipes(self) -> None:
         """Pipes in no main direction, some with an elbow of an odd angle."""
         for _ in range(int(self.rng.integers(2, 4))):
-            self._try(self._oblique_pipe, 0.03, free=True, n_tries=25)
+            self._try(self._oblique_pipe, CLEAR, free=True, n_tries=25)
 
     def _oblique_pipe(self) -> Run:
         size = self._size(200)

@@ -19,7 +19,8 @@ from pipecore.simulate.seen import with_coverage
 from pipecore.simulate.truth import Truth
 from pipecore.types import NO_ID, PointCloud
 
-CHUNK = 400_000
+CHUNK = 100_000
+"""Rays between two reports of progress. Part of what a seed means: it orders the random numbers."""
 FULL_INTENSITY = 4095.0
 LAMPS = np.array([[0.35, -0.5, 0.79], [-0.6, 0.45, 0.66]])
 LAMP_POWER = np.array([0.42, 0.22])

@@ -47,14 +47,15 @@ def test_that_runs_do_not_penetrate_each_other(plant: Scene) -> None:
             chainage, rho, clock = element.axis.pipe_coordinates(points[run])
             inside = (chainage > 0) & (chainage < element.axis.length)
             depth = placed.surface.radius(chainage[inside], clock[inside]) - rho[inside]
-            # Bulges and bows may lean on a neighbour a little.
-            assert depth.max(initial=0.0) < 0.015, (plant.seed, run, other)
+            # Two bows may lean on each other a little.
+            assert depth.max(initial=0.0) < 0.011, (plant.seed, run, other)
 
 
-def test_that_pipes_touch_and_nearly_touch_in_some_plants(seed: int) -> None:
+def test_that_pipes_touch_and_nearly_touch_in_some_plants() -> None:
     gaps = []
-    for k in range(4):
-        placement = place_runs(random_scene(seed % 10_000 + k, deformed=False))
+    # Given plants: what is in one plant is chance.
+    for k in range(6):
+        placement = place_runs(random_scene(k, deformed=False))
         straights = [p for p in placement.elements if p.element.kind is ElementKind.CYLINDER]
         for a, b in itertools.combinations(straights, 2):
             if a.element.run_id == b.element.run_id:
@@ -69,15 +70,15 @@ def test_that_pipes_touch_and_nearly_touch_in_some_plants(seed: int) -> None:
     assert (gaps > 0.1).sum() > 20
 
 
-def test_that_plants_hold_all_kinds_of_elements_and_deformations(seed: int) -> None:
+def test_that_plants_hold_all_kinds_of_elements_and_deformations() -> None:
     kinds, deformations, lengths = set(), set(), []
     for k in range(6):
-        placement = place_runs(random_scene(seed % 10_000 + k))
+        placement = place_runs(random_scene(k))
         kinds |= {p.element.kind for p in placement.elements}
         deformations |= {d.kind for d in placement.deformations()}
         lengths.append(sum(p.element.axis.length for p in placement.elements))
-    assert kinds >= set(ElementKind) - {ElementKind.OTHER, ElementKind.SPHERE}
-    assert len(deformations) >= 2
+    assert kinds == set(ElementKind) - {ElementKind.OTHER}
+    assert deformations == set(DeformationKind) - {DeformationKind.KINK}
     assert min(lengths) > 25.0
 
 
