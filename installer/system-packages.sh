@@ -7,9 +7,8 @@ cd "$(dirname "$0")/.."
 # the virtual display in which tests open their windows where there is no other.
 packages="
     libdbus-1-3 libegl1 libfontconfig1 libgl1 libglib2.0-0 libgomp1 libusb-1.0-0
-    libxcb-cursor0 libxcb-icccm4 libxcb-keysyms1 libxcb-shape0 libxcursor1 libxkbcommon-x11-0
-    libxkbcommon0
-    fonts-dejavu-core xauth xvfb"
+    libxcb-cursor0 libxcb-icccm4 libxcb-keysyms1 libxcb-shape0 libxcursor1
+    libxkbcommon-x11-0 libxkbcommon0 fonts-dejavu-core xauth xvfb"
 
 if ! command -v apt-get >/dev/null; then
     exit 0
