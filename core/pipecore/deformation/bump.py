@@ -27,9 +27,6 @@ CLEAR = 12.0
 CORE = 0.75
 """Where the fit is held against its points: up to this share of the half extents."""
 
-FREE_FORM_ADVANTAGE = 6.0
-"""How much lower its AIC must be."""
-
 HEIGHT_PRIOR = 0.5
 """Standard deviation of heights believed in beforehand, share of the diameter."""
 
@@ -103,12 +100,15 @@ def fit_bump(
         length, width = np.exp(first[3:5])
         if min(length, width) < MIN_EXTENT * diameter or max(length, width) > MAX_EXTENT * diameter:
             return None
-    best = plain
+    best, doubt = plain, 0.0
     if abs(first[0]) > CLEAR * _height_sd(data, length, width):
         free = _fit(data, np.append(first, 0.0), diameter, contour_sd)
-        # One parameter more has to be worth it.
-        if free.chi2 < plain.chi2 - 2 - FREE_FORM_ADVANTAGE:
+        gain = plain.chi2 - free.chi2 - 2  # by AIC: one parameter more has to be worth it
+        if gain > 0:
             best = free
+        # That it may be the other form is part of the uncertainty of the height.
+        share = 1 / (1 + np.exp(min(abs(gain), 50.0) / 2))
+        doubt = share * (free.parameters[0] - plain.parameters[0]) ** 2
     height, along_peak, around_peak = best.parameters[:3]
     length, width = np.exp(best.parameters[3:5])
     misfit = _core_misfit(data, best)
@@ -118,7 +118,7 @@ def fit_bump(
         along=float(along_peak),
         around=float(around_peak),
         height=float(height),
-        height_sd=float(np.sqrt(best.covariance[0, 0]) * max(misfit, 1.0)),
+        height_sd=float(np.sqrt(best.covariance[0, 0] * max(misfit, 1.0) ** 2 + doubt)),
         length=float(length),
         width=float(width),
         curvature_along=float(second[0]),
@@ -170,7 +170,7 @@ def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: flo
             p[5] / max(contour_sd, 1e-5),
             np.log(q) / FORM_PRIOR,
         ]
-        return np.append((deviation - model) / noise, beliefs)
+        return np.asarray(np.append((deviation - model) / noise, beliefs))
 
     scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
     answer = least_squares(

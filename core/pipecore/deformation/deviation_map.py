@@ -63,12 +63,12 @@ class Grid:
     @property
     def chainages(self) -> Array:
         """Centres of the rows, metres."""
-        return (np.arange(self.n_rows) + 0.5) * self.row_size
+        return np.asarray((np.arange(self.n_rows) + 0.5) * self.row_size)
 
     @property
     def clocks(self) -> Array:
         """Centres of the columns, radians."""
-        return (np.arange(self.n_columns) + 0.5) * self.column_angle
+        return np.asarray((np.arange(self.n_columns) + 0.5) * self.column_angle)
 
     def cell_of(self, chainage: Array, clock: Array) -> Cells:
         """Flat index of the cell of each point; those beyond the ends fall into end cells."""
@@ -78,12 +78,13 @@ class Grid:
 
     def count(self, cell: Cells) -> Array:
         """Points per cell."""
-        return np.bincount(cell, minlength=self.n_rows * self.n_columns).reshape(self.shape) * 1.0
+        counts = np.bincount(cell, minlength=self.n_rows * self.n_columns)
+        return counts.reshape(self.shape).astype(np.float64)
 
     def total(self, cell: Cells, values: Array) -> Array:
         """Sum of `values` per cell."""
         size = self.n_rows * self.n_columns
-        return np.bincount(cell, values, minlength=size).reshape(self.shape)
+        return np.bincount(cell, values, minlength=size).reshape(self.shape).astype(np.float64)
 
     def mean(self, cell: Cells, values: Array) -> Array:
         """Mean of `values` per cell, nan where there is none."""
@@ -206,4 +207,4 @@ def group_median(group: Cells, values: Array, n_groups: int) -> tuple[Array, Arr
     high = first[some] + counts[some] // 2
     ordered = values[order]
     result[some] = (ordered[low] + ordered[high]) / 2
-    return result, counts * 1.0
+    return result, counts.astype(np.float64)

@@ -59,7 +59,7 @@ class DeformationFinding:
     straightness: float = np.nan
 
 
-def find_deformations(
+def find_deformations(  # noqa: PLR0917  (the pipeline's call)
     element: Element,
     xyz: Array,
     normals: Array,
@@ -116,7 +116,9 @@ def find_deformations(
         deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
     straightness = np.nan
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
-        straightness, bow = _measure_bow(element, surface, heights, patches, n_terms, settings)
+        straightness, bow = _measure_bow(
+            element, surface, heights, patches, n_terms=n_terms, settings=settings
+        )
         deformations += bow
 
     deviation = np.full(len(xyz), np.nan, np.float32)
@@ -170,7 +172,12 @@ def _as_deformation(
     wall = settings.wall_thickness_mm / 1000
     if wall > 0 and bump.height < 0 and depth >= STRAIN_SIGNIFICANCE * bump.height_sd:
         strain = dent_strain(
-            depth, bump.length, bump.curvature_along, bump.curvature_around, radius, wall
+            depth=depth,
+            length=bump.length,
+            curvature_along=bump.curvature_along,
+            curvature_around=bump.curvature_around,
+            radius=radius,
+            wall=wall,
         )
     return Deformation(
         deformation_id=NO_ID,
@@ -222,6 +229,7 @@ def _measure_bow(
     surface: Surface,
     heights: DeviationMap,
     patches: list[Patch],
+    *,
     n_terms: int,
     settings: DeformationSettings,
 ) -> tuple[float, list[Deformation]]:

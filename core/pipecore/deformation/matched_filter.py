@@ -41,6 +41,7 @@ class Candidate:
 
 def find_candidates(
     grid: Grid,
+    *,
     deviation: Array,
     weight: Array,
     count: Array,
@@ -116,11 +117,11 @@ def _respond(
         return np.asarray(ndimage.correlate1d(along, kernels[1], axis=1, mode="wrap"))
 
     evidence = correlate(weight * np.nan_to_num(deviation), bell)
-    precision = np.maximum(correlate(weight, [k**2 for k in bell]), 1e-12)
-    points = correlate(count, [(k > 0.1) * 1.0 for k in bell])
+    precision = np.maximum(correlate(weight, [np.square(k) for k in bell]), 1e-12)
+    points = correlate(count, [(k > 0.1).astype(np.float64) for k in bell])
     return evidence / precision, 1.0 / np.sqrt(precision), points
 
 
 def _bell(size: float, cell: float) -> Array:
     half = int(np.floor(size / 2 / cell))
-    return np.cos(np.pi * np.arange(-half, half + 1) * cell / size) ** 2
+    return np.asarray(np.cos(np.pi * np.arange(-half, half + 1) * cell / size) ** 2)

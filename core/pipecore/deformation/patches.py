@@ -60,11 +60,8 @@ def find_patches(
     grid = cells.grid
     variance = np.where(cells.count > 0, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
 
-
     def contour_by(variance: Array) -> Contour:
-        return fit_contour(
-            grid, cells.deviation, variance, n_terms, knot_diameters=knot_diameters
-        )
+        return fit_contour(grid, cells.deviation, variance, n_terms, knot_diameters=knot_diameters)
 
     contour = contour_by(variance)
     for _ in range(N_ROUNDS):
@@ -84,10 +81,14 @@ def find_patches(
 def _candidates(cells: DeviationMap, contour: Contour, threshold: float) -> list[Candidate]:
     some = cells.count > 0
     weight = np.where(some, cells.count / cells.noise**2, 0.0)
-    allowed = cells.covered & ~cells.disputed
-    deviation = cells.deviation - contour.height
     return find_candidates(
-        cells.grid, deviation, weight, cells.count, contour.sd, allowed, threshold
+        cells.grid,
+        deviation=cells.deviation - contour.height,
+        weight=weight,
+        count=cells.count,
+        contour_sd=contour.sd,
+        allowed=cells.covered & ~cells.disputed,
+        threshold=threshold,
     )
 
 
@@ -146,7 +147,8 @@ def _shares(
     turn = np.mod(grid.clocks - clock + np.pi, 2 * np.pi) - np.pi
     u = (grid.chainages - chainage) / (length / 2)
     v = turn * grid.radius / (width / 2)
-    return np.broadcast_arrays(u[:, None], v[None, :])
+    along, around = np.broadcast_arrays(u[:, None], v[None, :])
+    return along, around
 
 
 def _closed_sides(
@@ -180,7 +182,8 @@ def _is_enclosed(cells: DeviationMap, chainage: float, clock: float, bump: Bump)
     if bump.height < 0:
         return n_closed >= 3
     disputed = np.count_nonzero(dilate(cells.disputed) & inside)
-    return n_closed == 4 and disputed < 0.1 * np.count_nonzero(inside) and bump.misfit < MAX_MISFIT
+    is_own = disputed < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
+    return n_closed == 4 and bool(is_own)
 
 
 def _without_overlap(patches: list[Patch]) -> list[Patch]:

@@ -26,7 +26,7 @@ MAX_INTERVALS = 60
 FLOOR = 2e-4
 """Cell means are not trusted below 0.2 mm, however many points they have."""
 
-LEVEL_PRIOR, WALK_PRIOR = 0.03, 0.012
+LEVEL_PRIOR, WALK_PRIOR = 0.1, 0.02
 """How far a coefficient lies from zero, and changes over two diameters: shares of the radius."""
 
 CAUCHY, TUKEY = 2.4, 4.7
@@ -52,7 +52,7 @@ class Contour:
     @property
     def n_terms(self) -> int:
         """Three, or five with ovality."""
-        return self.coefficients.shape[1]
+        return int(self.coefficients.shape[1])
 
     @property
     def terms(self) -> Array:
@@ -63,7 +63,7 @@ class Contour:
     def term_covariance(self) -> Array:
         """Covariance of the coefficients at every row, shape (rows, terms, terms)."""
         half = np.einsum("ra,akbl->rkbl", self.basis, self.covariance, optimize=True)
-        return np.einsum("rkbl,rb->rkl", half, self.basis, optimize=True)
+        return np.asarray(np.einsum("rkbl,rb->rkl", half, self.basis, optimize=True))
 
     @property
     def height(self) -> Array:
@@ -75,7 +75,7 @@ class Contour:
         """Standard deviation of `height` per cell, metres."""
         phi = harmonics(self.grid.clocks, self.n_terms)
         variance = np.einsum("rkl,ck,cl->rc", self.term_covariance, phi, phi, optimize=True)
-        return np.sqrt(np.maximum(variance, 0.0))
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def harmonics(clock: Array, n_terms: int) -> Array:
@@ -156,8 +156,9 @@ def _prior_precision(
     steps = np.diff(np.eye(n_splines), axis=0)
     precision = np.zeros((n_splines, n_terms, n_splines, n_terms))
     for k in range(n_terms):
-        stiff = 1e-3 if constant_radius and k == 0 else 1.0
-        precision[:, k, :, k] = steps.T @ steps / (walk * stiff) ** 2
+        # A radius held constant leaves the centre well known: it needs no prior to speak of.
+        freedom = (1e-3 if k == 0 else 10.0) if constant_radius else 1.0
+        precision[:, k, :, k] = steps.T @ steps / (walk * freedom) ** 2
         precision[:, k, :, k] += np.eye(n_splines) / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
     return precision
 

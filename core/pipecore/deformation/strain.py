@@ -4,6 +4,7 @@ import numpy as np
 
 
 def dent_strain(
+    *,
     depth: float,
     length: float,
     curvature_along: float,

@@ -19,7 +19,7 @@ from pipecore.geometry import Array
 from pipecore.types import Element
 
 INWARD_REACH, OUTWARD_REACH = 0.5, 0.25
-"""How far from the fitted surface deformations are looked for, shares of the radius."""
+"""How far from the contour deformations are looked for, shares of the radius."""
 
 MIN_ALIGNMENT = np.cos(np.deg2rad(50.0))
 """The flank of the steepest dent (35°) with a noisy normal (5°, three times)."""
@@ -63,7 +63,7 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     radius = (element.radius + element.radius_end) / 2
     length = element.axis.length
     near = (points.chainage > -0.05 * radius) & (points.chainage < length + 0.05 * radius)
-    near &= (points.height > -INWARD_REACH * radius) & (points.height < OUTWARD_REACH * radius)
+    near &= np.abs(points.height) < INWARD_REACH * radius
     facing = near & ~(points.alignment < MIN_ALIGNMENT)
     band = max(4 * min(element.rms, 0.03 * radius), 0.02 * radius)
     core = facing & (np.abs(points.height) < band)
@@ -78,6 +78,7 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     contour = _first_contour(grid, points, cell, facing, sigma)
     level = points.height - contour.ravel()[cell]
     noise = sigma.ravel()[cell]
+    facing &= (level > -INWARD_REACH * radius) & (level < OUTWARD_REACH * radius)
 
     value = _grow(grid, level, noise, cell, facing)
     slope = _steepness(value)
@@ -89,7 +90,13 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     company = box_sum(grid.count(cell[belongs]), 2)
     belongs &= company.ravel()[cell] >= 3
 
-    above = near & ~belongs & (level > 4 * noise) & (level > local + tolerance)
+    above = (
+        near
+        & (level < OUTWARD_REACH * radius)
+        & ~belongs
+        & (level > 4 * noise)
+        & (level > local + tolerance)
+    )
     foreign = grid.count(cell[above]) >= 2
     sigma = local_noise(grid, cell[belongs], points.height[belongs])
     return Surface(grid, points, belongs, cell, sigma, foreign)

@@ -61,9 +61,9 @@ def surface_distance(element: Element, xyz: Array) -> Array:
     """Unsigned distance of points (n, 3) from an element's surface between its ends."""
     chainage, distance, _ = element.axis.pipe_coordinates(xyz)
     if element.kind is ElementKind.SPHERE:
-        return np.abs(np.linalg.norm(xyz - element.centre, axis=1) - element.radius)
+        return np.asarray(np.abs(np.linalg.norm(xyz - element.centre, axis=1) - element.radius))
     within = np.clip(chainage, 0.0, element.axis.length)
-    return np.hypot(distance - element.radius_at(within), chainage - within)
+    return np.asarray(np.hypot(distance - element.radius_at(within), chainage - within))
 
 
 def stretch(element: Element, clock: float) -> float:

@@ -19,7 +19,7 @@ Shape = Callable[[Array, Array], Array]
 """Radial deviation in metres at (chainage, clock), outward positive."""
 
 
-def bump(s0: float, clock: float, height: float, length: float, width: float, r: float) -> Shape:
+def bump(s0: float, clock: float, height: float, *, length: float, width: float, r: float) -> Shape:
     """A cosine bell over an ellipse: `length` along, `width` around (metres), signed height."""
 
     def deviation(s: Array, theta: Array) -> Array:
@@ -169,14 +169,14 @@ class PipeScene:
         p = p + self.noise * rng.normal(size=len(p))[:, None] * to_station
         return p, own
 
-    def _contact(self, axis: LineAxis | ArcAxis) -> tuple[Array, Array, Array]:
-        """Point, outward and along at which the post and the crossing pipe touch."""
-        s, clock = 0.6 * self.length, self.views[0] + 0.9
+    def _contact(self, axis: LineAxis | ArcAxis, turn: float) -> tuple[Array, Array, Array]:
+        """Point, outward and along of a contact that lies `turn` from the first view."""
+        s, clock = 0.6 * self.length, self.views[0] + turn
         outward = surface_points(axis, s, 1.0, clock) - axis.at(s)
         return axis.at(s) + self.radius * outward, outward, axis.tangent(s)
 
     def _crossing_element(self, axis: LineAxis | ArcAxis) -> Element:
-        at, outward, along = self._contact(axis)
+        at, outward, along = self._contact(axis, 0.9)
         r = 0.7 * self.radius
         across = np.cross(outward, along)
         line = LineAxis.between(at + r * outward - across, at + r * outward + across)
@@ -196,7 +196,8 @@ class PipeScene:
 
         r = self.radius
         if self.post:  # a box whose top touches the pipe
-            at, outward, along = self._contact(axis)
+            # Just out of the station's sight; what stands out beyond is in it.
+            at, outward, along = self._contact(axis, 1.75)
             across = np.cross(outward, along)
             n = int(0.1 * 0.3 * density)
             u, v = rng.uniform(-0.05, 0.05, n), rng.uniform(-0.15, 0.15, n)

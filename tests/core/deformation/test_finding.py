@@ -1,0 +1,199 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipecore.deformation import find_deformations
+from pipecore.settings import DeformationSettings
+from pipecore.types import DeformationKind
+from tests.core.deformation.sampler import PipeScan, PipeScene, bump, oval
+
+SETTINGS = DeformationSettings()
+PATCHES = (DeformationKind.DENT, DeformationKind.BULGE)
+
+
+def find(scan: PipeScan, settings: DeformationSettings = SETTINGS):
+    return find_deformations(
+        scan.element, scan.xyz, scan.normals, scan.neighbours, scan.profiles, settings
+    )
+
+
+def dented(height=-0.01, radius=0.11, size=0.11, clock=0.2, **scene) -> PipeScene:
+    shape = bump(0.8, clock, height, length=size, width=size, r=radius)
+    return PipeScene(radius=radius, length=1.8, shapes=[shape], **scene)
+
+
+@pytest.mark.parametrize("height", [-0.012, 0.012])
+@pytest.mark.parametrize("radius", [0.084, 0.2])
+def test_that_a_dent_or_bulge_is_measured_within_its_uncertainty(rng, radius, height):
+    scan = dented(height, radius, radius).scan(rng)
+    (found,) = find(scan).deformations
+    assert found.kind is (DeformationKind.DENT if height < 0 else DeformationKind.BULGE)
+    assert abs(found.depth - 0.012) < 5 * found.depth_sd
+    assert found.depth_sd < 0.0015
+    assert found.length == pytest.approx(radius, rel=0.35)
+    assert found.width == pytest.approx(radius, rel=0.35)
+    assert abs(found.chainage - 0.8) < 0.02
+    assert abs(found.clock - 0.2) * radius < 0.02
+    # The peak is a point of the deformed surface.
+    _, distance, _ = scan.element.axis.pipe_coordinates(found.peak[None])
+    assert distance[0] == pytest.approx(radius + height, abs=0.004)
+
+
+def test_that_a_dent_deeper_than_a_quarter_of_the_radius_is_not_cut_off(rng):
+    (found,) = find(dented(-0.035, size=0.2).scan(rng)).deformations
+    assert found.depth == pytest.approx(0.035, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    "clutter",
+    [{}, {"flanges": True, "post": True}, {"crossing": True, "elbow": True}, {"mixed": True}],
+    ids=["alone", "flanges and post", "crossing and elbow", "mixed pixels"],
+)
+@pytest.mark.parametrize("views", [(0.3,), (0.3, 2.4)], ids=["one station", "two stations"])
+def test_that_a_clean_pipe_raises_no_alarm(rng, clutter, views):
+    scene = PipeScene(radius=0.11, length=3.0, views=views, arc=np.deg2rad(150), **clutter)
+    assert find(scene.scan(rng)).deformations == ()
+
+
+def test_that_a_known_neighbour_in_contact_raises_no_alarm(rng):
+    scene = PipeScene(radius=0.11, length=2.0, crossing=True, crossing_known=True)
+    assert find(scene.scan(rng)).deformations == ()
+
+
+def test_that_own_points_belong_and_their_deviation_is_that_of_the_dent(rng):
+    scene = dented(-0.015)
+    scan = scene.scan(rng)
+    finding = find(scan)
+    assert finding.belongs[scan.is_own].mean() > 0.97
+    assert np.array_equal(np.isnan(finding.deviation), ~finding.belongs)
+    s, _, clock = scan.element.axis.pipe_coordinates(scan.xyz)
+    own = finding.belongs
+    residual = finding.deviation[own] - scene.shapes[0](s[own], clock[own])
+    # The noise lies along the ray, so that less of it is radial.
+    assert np.sqrt(np.mean(residual**2)) < 0.0022
+    assert abs(np.mean(residual)) < 0.0003
+
+
+def test_that_the_surface_of_a_touching_post_does_not_belong_beyond_the_contact(rng):
+    scan = PipeScene(radius=0.15, length=2.0, post=True).scan(rng)
+    finding = find(scan)
+    _, distance, _ = scan.element.axis.pipe_coordinates(scan.xyz)
+    off = ~scan.is_own & (np.abs(distance - 0.15) > 0.02)
+    assert np.count_nonzero(off) > 5
+    assert finding.belongs[off].mean() < 0.1
+    assert finding.belongs[scan.is_own].mean() > 0.95
+
+
+def test_that_the_order_of_points_does_not_matter(rng):
+    scan = dented(flanges=True).scan(rng)
+    order = rng.permutation(len(scan.xyz))
+    shuffled = replace(scan, xyz=scan.xyz[order], normals=scan.normals[order])
+    first, second = find(scan), find(shuffled)
+    assert np.array_equal(first.belongs[order], second.belongs)
+    assert np.allclose(first.deviation[order], second.deviation, atol=1e-8, equal_nan=True)
+    for a, b in zip(first.deformations, second.deformations, strict=True):
+        assert a.depth == pytest.approx(b.depth, rel=1e-4)
+        assert a.chainage == pytest.approx(b.chainage, abs=1e-5)
+
+
+def test_that_the_sign_of_the_normals_does_not_matter(rng):
+    scan = dented().scan(rng)
+    turned = replace(scan, normals=scan.normals * rng.choice([-1, 1], (len(scan.xyz), 1)))
+    (a,), (b,) = find(scan).deformations, find(turned).deformations
+    assert a.depth == b.depth
+
+
+def test_that_an_oval_stretch_is_one_thing(rng):
+    scene = PipeScene(
+        radius=0.11, length=3.0, views=(0.0, 2.2), shapes=[oval(0.8, 2.0, 0.05, 0.4, 0.11)]
+    )
+    finding = find(scene.scan(rng))
+    (found,) = finding.deformations
+    assert found.kind is DeformationKind.OVALITY
+    assert found.ovality == pytest.approx(0.05, abs=0.008)
+    assert found.chainage_start == pytest.approx(0.8, abs=0.25)
+    assert found.chainage_end == pytest.approx(2.0, abs=0.25)
+    turn = np.mod(found.clock - 0.4 + np.pi / 2, np.pi) - np.pi / 2
+    assert abs(turn) < np.deg2rad(10)
+    assert finding.ovality_sd > 0
+
+
+def test_that_ovality_seen_from_one_side_is_not_measurable(rng):
+    scene = PipeScene(radius=0.11, length=2.0, shapes=[oval(0.5, 1.6, 0.04, 0.0, 0.11)])
+    finding = find(scene.scan(rng))
+    assert np.isnan(finding.ovality)
+    assert DeformationKind.OVALITY not in {d.kind for d in finding.deformations}
+
+
+def test_that_a_round_pipe_has_no_ovality_beyond_its_uncertainty(rng):
+    finding = find(PipeScene(radius=0.11, length=3.0, views=(0.0, 2.0)).scan(rng))
+    assert finding.ovality < 5 * finding.ovality_sd + 1e-4
+
+
+@pytest.mark.parametrize("kind", [DeformationKind.BOW, DeformationKind.KINK])
+def test_that_the_sag_of_a_pipe_is_measured(rng, kind):
+    def sag(s):
+        if kind is DeformationKind.KINK:
+            return np.interp(s, [0, 2, 4], [0, 0.015, 0])
+        return 0.015 * np.sin(np.pi * s / 4)
+
+    finding = find(PipeScene(radius=0.11, length=4.0, sag=sag).scan(rng))
+    (found,) = finding.deformations
+    assert found.kind is kind
+    assert found.depth == pytest.approx(0.015, abs=0.002)
+    assert found.depth == finding.straightness
+    assert found.chainage == pytest.approx(2.0, abs=0.4)
+
+
+def test_that_a_straight_pipe_is_straight(rng):
+    finding = find(PipeScene(radius=0.084, length=4.0).scan(rng))
+    assert finding.straightness < 0.0015
+
+
+def test_that_a_dent_in_a_bowed_pipe_is_told_from_the_bow(rng):
+    scene = replace(dented(-0.012), length=3.0, sag=lambda s: 0.015 * np.sin(np.pi * s / 3))
+    found = {d.kind: d for d in find(scene.scan(rng)).deformations}
+    assert set(found) == {DeformationKind.DENT, DeformationKind.BOW}
+    assert found[DeformationKind.DENT].depth == pytest.approx(0.012, rel=0.25)
+
+
+@pytest.mark.parametrize("form", [{"bend_radius": 0.6}, {"radius_end": 0.08}], ids=["bend", "cone"])
+def test_that_dents_in_bends_and_reducers_are_found(rng, form):
+    shape = bump(0.4, 0.1, -0.012, length=0.11, width=0.11, r=0.11)
+    scene = PipeScene(radius=0.11, length=0.8, shapes=[shape], **form)
+    found = [d for d in find(scene.scan(rng)).deformations if d.kind in PATCHES]
+    (dent,) = found
+    assert dent.kind is DeformationKind.DENT
+    assert dent.depth == pytest.approx(0.012, rel=0.25)
+    assert abs(dent.chainage - 0.4) < 0.02
+
+
+def test_that_strain_needs_the_wall_thickness(rng):
+    scan = dented(-0.015).scan(rng)
+    (without,) = find(scan).deformations
+    (thick,) = find(scan, DeformationSettings(wall_thickness_mm=10.0)).deformations
+    (thin,) = find(scan, DeformationSettings(wall_thickness_mm=5.0)).deformations
+    assert np.isnan(without.strain)
+    assert 0 < thin.strain < thick.strain < 1
+
+
+def test_that_a_handful_of_points_gives_no_answer(rng):
+    scan = dented().scan(rng)
+    few = replace(scan, xyz=scan.xyz[:20], normals=scan.normals[:20])
+    finding = find(few)
+    assert finding.deformations == ()
+    assert not finding.belongs.any()
+    assert finding.map is None
+
+
+def test_that_holes_in_the_coverage_stay_holes(rng):
+    scan = PipeScene(radius=0.11, length=2.0).scan(rng)
+    s, _, _ = scan.element.axis.pipe_coordinates(scan.xyz)
+    keep = (s < 0.9) | (s > 1.2)
+    finding = find(replace(scan, xyz=scan.xyz[keep], normals=scan.normals[keep]))
+    assert finding.deformations == ()
+    assert finding.map is not None
+    hole = np.abs(finding.map.grid.chainages - 1.05) < 0.1
+    assert np.isnan(finding.map.deviation[hole]).all()
+    assert not finding.map.covered[hole].any()
