@@ -75,7 +75,9 @@ def _polylines(curves: list[Array]) -> pv.PolyData:
 
 def _surface(element: Element) -> pv.PolyData:
     if element.kind is ElementKind.SPHERE:
-        return pv.Sphere(element.radius, element.centre, theta_resolution=48, phi_resolution=24)
+        return pv.Sphere(
+            radius=element.radius, center=element.centre, theta_resolution=48, phi_resolution=24
+        )
     s, clock = np.meshgrid(_chainages(element), np.linspace(0, 2 * np.pi, N_AROUND + 1))
     points = surface_points(element.axis, s.ravel(), element.radius_at(s.ravel()), clock.ravel())
     normals = points - element.axis.at(s.ravel())

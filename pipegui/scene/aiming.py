@@ -1,0 +1,86 @@
+"""Where the camera goes to show a selection. Nothing here knows VTK."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipecore.geometry import Array, unit
+from pipecore.types import Deformation, Element, ElementKind
+from pipegui.scene import pose as poses
+from pipegui.scene import shapes
+from pipegui.scene.pose import VIEW_ANGLE, Pose
+from pipegui.view_state import SceneState
+
+ELEMENT_MARGIN = 1.6
+"""Some of the surroundings help to see where an element is."""
+SMALLEST_SHARE = 0.15
+"""Of the picture's height; smaller things do not count as seen well."""
+
+
+def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> Pose | None:
+    """Return the pose that shows the selection of `state`, or None to stay.
+
+    Parameters
+    ----------
+    state : SceneState
+    pose : Pose
+        Where the camera is.
+    aspect : float
+        Width over height of the picture.
+    stay_if_seen : bool
+        Whether to stay where the selected element or run is already seen well.
+    """
+    result, selection = state.result, state.selection
+    if result is None:
+        return None
+    if state.profile is not None:
+        return _aim_at_profile(state.profile.centre[0], float(state.profile.radius[0]), pose)
+    if selection.deformation_id:
+        deformation = result.deformation(selection.deformation_id)
+        return _aim_at_deformation(
+            deformation, result.element(deformation.element_id), pose, aspect
+        )
+    elements = tuple(
+        e
+        for e in result.elements
+        if (e.element_id == selection.element_id if selection.element_id else True)
+        and selection.run_id == e.run_id
+    )
+    if not elements:
+        return None
+    points = shapes.outline(elements)
+    if stay_if_seen and _is_seen(points, pose, aspect):
+        return None
+    return poses.framing(pose, points, aspect, ELEMENT_MARGIN)
+
+
+def _aim_at_profile(centre: Array, radius: float, pose: Pose) -> Pose:
+    """Follow from profile to profile without changing the side that is looked at."""
+    distance = float(np.clip(pose.distance, 8 * radius, 24 * radius))
+    return replace(pose, focus=centre, distance=distance)
+
+
+def _aim_at_deformation(
+    deformation: Deformation, element: Element, pose: Pose, aspect: float
+) -> Pose:
+    """Look at the peak from outside, with enough of the pipe around it."""
+    if element.kind is ElementKind.SPHERE:
+        inside = element.centre
+    else:
+        inside = element.axis.at(float(np.clip(deformation.chainage, 0, element.axis.length)))
+    pose = poses.looking_along(pose, unit(inside - deformation.peak))
+    half = max(deformation.length, 3 * element.radius)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    return poses.framing(pose, inside + half / np.sqrt(3) * corners, aspect)
+
+
+def _is_seen(points: Array, pose: Pose, aspect: float) -> bool:
+    offset = points - pose.position
+    depth = offset @ pose.forward
+    if (depth <= 0).any():
+        return False
+    half = np.tan(VIEW_ANGLE / 2)
+    x, y = offset @ pose.right / depth / half / aspect, offset @ pose.up / depth / half
+    inside = (np.abs(x) < 1) & (np.abs(y) < 1)
+    size = max(np.ptp(x) * aspect, np.ptp(y)) / 2
+    return bool(inside.all() and size > SMALLEST_SHARE)

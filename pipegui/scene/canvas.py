@@ -1,0 +1,240 @@
+"""The picture itself: VTK in a Qt widget, with the mouse that moves its camera."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtCore import QEasingCurve, QEvent, QPointF, Qt, QTimer, QVariantAnimation, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
+from PySide6.QtWidgets import QApplication, QWidget
+from pyvistaqt.rwi import QVTKRenderWindowInteractor
+from vtkmodules.vtkRenderingCore import vtkCamera, vtkRenderer
+
+from pipecore.geometry import Array
+from pipegui.scene import pose as poses
+from pipegui.scene.pose import VIEW_ANGLE, Pose
+from pipegui.scene.projection import Projection, as_array
+
+FLIGHT_MS = 300
+REST_MS = 250
+"""The camera counts as moving for so long after its last move."""
+RADIANS_PER_PX = np.deg2rad(0.35)
+ZOOM_PER_STEP = 0.8
+CLOSER = 0.4
+N_LAYERS = 2
+
+LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
+SHIFT = Qt.KeyboardModifier.ShiftModifier
+
+
+class Canvas(QVTKRenderWindowInteractor):
+    """Draws two layers, the second always over the first, and turns mouse into camera.
+
+    Left drag orbits about the point under the cursor, middle or shift drag pans, the
+    wheel zooms to the cursor, a double click flies closer. VTK's own interaction is not used.
+    """
+
+    clicked = Signal(QPointF)
+    hovered = Signal(QPointF)
+    left = Signal()
+    before_frame = Signal()
+    drawn = Signal(float)
+    """A frame was drawn; the seconds that it took."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        # QVTKRenderWindowInteractor connects this to its bound method, which would
+        # keep both alive; `SceneView.close` closes the canvas instead.
+        parent.destroyed.disconnect(self.close)
+        self.point_under: Callable[[QPointF], Array | None] = lambda _: None
+        self.pose = Pose(np.zeros(3), 1.0)
+        self.is_moving = False
+        self._is_stale = True
+        self._press: QPointF | None = None
+        self._last: QPointF | None = None
+        self._is_drag = False
+        self._pivot = np.zeros(3)
+        self._camera = vtkCamera()
+        self._camera.SetViewAngle(float(np.rad2deg(VIEW_ANGLE)))
+        self.layers = [vtkRenderer() for _ in range(N_LAYERS)]
+        window = self.GetRenderWindow()
+        window.SetMultiSamples(0)
+        window.SetNumberOfLayers(N_LAYERS)
+        for i, layer in enumerate(self.layers):
+            layer.SetLayer(i)
+            layer.SetActiveCamera(self._camera)
+            window.AddRenderer(layer)
+        window.GetInteractor().Initialize()  # else it does not render
+        self._resting = QTimer(self, singleShot=True, interval=REST_MS)
+        self._resting.timeout.connect(self._rest)
+        self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
+        self._flight.setEasingCurve(QEasingCurve.Type.InOutCubic)
+        self._flight.valueChanged.connect(self._fly_on)
+        self._flight_ends = (self.pose, self.pose)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+
+    # Drawing
+
+    def draw(self) -> None:
+        """Draw anew when Qt next paints."""
+        self._is_stale = True
+        self.update()
+
+    def paintGL(self) -> None:  # noqa: N802
+        """Draw once if anything has changed, else show the last picture again.
+
+        The widget paints whenever anything over it changes; only `draw` makes VTK work.
+        """
+        if not self._is_stale:
+            self._in_paint = True  # pyvistaqt draws only where this is False
+            try:
+                super().paintGL()
+            finally:
+                self._in_paint = False
+            return
+        self._is_stale = False
+        self._place_camera()
+        self.before_frame.emit()
+        start = time.perf_counter()
+        super().paintGL()
+        self.GetRenderWindow().WaitForCompletion()  # else only giving the orders is timed
+        self.drawn.emit(time.perf_counter() - start)
+
+    def resizeGL(self, width: int, height: int) -> None:  # noqa: N802
+        """Draw anew in the new size."""
+        super().resizeGL(width, height)
+        self._is_stale = True
+
+    def _place_camera(self) -> None:
+        pose = self.pose
+        self._camera.SetFocalPoint(pose.focus)
+        self._camera.SetPosition(pose.position)
+        self._camera.SetViewUp(pose.up)
+        bounds = np.array([layer.ComputeVisiblePropBounds() for layer in self.layers])
+        bounds = bounds[bounds[:, 0] <= bounds[:, 1]]
+        if len(bounds):
+            low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
+            self.layers[0].ResetCameraClippingRange([*np.stack([low, high]).T.ravel()])
+
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        return self.width() / max(self.height(), 1)
+
+    def projection(self) -> Projection:
+        """The present mapping from local coordinates to the widget's pixels."""
+        self._place_camera()
+        near, far = self._camera.GetClippingRange()
+        to_clip = self._camera.GetCompositeProjectionTransformMatrix(self.aspect, near, far)
+        return Projection.of_camera(
+            as_array(to_clip),
+            as_array(self._camera.GetViewTransformMatrix()),
+            (self.width(), self.height()),
+            VIEW_ANGLE,
+        )
+
+    # Moving
+
+    def move_to(self, pose: Pose) -> None:
+        """Put the camera there at once; draw quickly now and fully a moment later."""
+        self.pose = pose
+        self.is_moving = True
+        self._resting.start()
+        self.draw()
+
+    def fly_to(self, pose: Pose, *, fly: bool = True) -> None:
+        """Take the camera there in `FLIGHT_MS`, or at once."""
+        self._flight.stop()
+        if not fly or not self.isVisible():
+            self.move_to(pose)
+            return
+        self._flight_ends = (self.pose, pose)
+        self._flight.start()
+
+    def _fly_on(self, share: float) -> None:
+        self.move_to(poses.between(*self._flight_ends, float(share)))
+
+    def _rest(self) -> None:
+        if QApplication.mouseButtons() & (LEFT | MIDDLE) and self._is_drag:
+            self._resting.start()
+            return
+        self.is_moving = False
+        self.draw()
+
+    # Mouse
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Take hold of what is under the cursor."""
+        self._flight.stop()
+        self._press = self._last = event.position()
+        self._is_drag = False
+        under = self.point_under(event.position())
+        self._pivot = self.pose.focus if under is None else under
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Orbit or pan while a button is held, else hover."""
+        position = event.position()
+        if self._press is None or self._last is None:
+            self.hovered.emit(position)
+            return
+        way = (position - self._press).manhattanLength()
+        if not self._is_drag and way < QApplication.startDragDistance():
+            return
+        self._is_drag = True
+        step, self._last = position - self._last, position
+        if event.buttons() & MIDDLE or event.modifiers() & SHIFT:
+            depth = float((self._pivot - self.pose.position) @ self.pose.forward)
+            size = self.projection().pixel_size(max(depth, poses.MIN_DISTANCE))
+            self.move_to(poses.pan(self.pose, -size * step.x(), size * step.y()))
+        elif event.buttons() & LEFT:
+            turn, tilt = RADIANS_PER_PX * step.x(), RADIANS_PER_PX * step.y()
+            self.move_to(poses.orbit(self.pose, turn, tilt, self._pivot))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Click, unless the mouse was dragged."""
+        was_click = self._press is not None and not self._is_drag
+        self._press = self._last = None
+        self._is_drag = False
+        if was_click and event.button() == LEFT:
+            self.clicked.emit(event.position())
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: N802
+        """Fly closer to what is under the cursor."""
+        under = self.point_under(event.position())
+        if under is not None and event.button() == LEFT:
+            self.fly_to(poses.zoom(self.pose, CLOSER, under))
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: N802
+        """Zoom; what is under the cursor stays there."""
+        self._flight.stop()
+        target = self.point_under(event.position())
+        if target is None:
+            origin, direction = self.projection().ray(event.position().x(), event.position().y())
+            depth = (self.pose.focus - origin) @ self.pose.forward
+            target = origin + depth / (direction @ self.pose.forward) * direction
+        steps = event.angleDelta().y() / 120
+        self.move_to(poses.zoom(self.pose, ZOOM_PER_STEP**steps, target))
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Nothing is hovered any more."""
+        self.left.emit()
+
+    def enterEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Keep VTK out of it."""
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Leave keys to the window."""
+        event.ignore()
+
+    keyReleaseEvent = keyPressEvent  # noqa: N815
+
+    def close(self) -> bool:
+        """Let go of VTK while its context is there."""
+        self._flight.stop()
+        self._resting.stop()
+        self.point_under = lambda _: None
+        for layer in self.layers:
+            layer.RemoveAllViewProps()
+            self.GetRenderWindow().RemoveRenderer(layer)
+        return super().close()

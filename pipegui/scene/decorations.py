@@ -1,0 +1,157 @@
+"""What is drawn beside the points: axes, ellipses, surfaces and the selection, as actors."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import pyvista as pv
+from PySide6.QtGui import QColor
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
+
+from pipecore.types import OWN_STACK, Element
+from pipegui import theme
+from pipegui.document import ColourBy
+from pipegui.scene import shapes
+from pipegui.scene.colouring import effective, visible_elements
+from pipegui.scene.point_layer import point_actor
+from pipegui.view_state import SceneState
+
+MAX_HIGHLIGHTED = 400_000
+SURFACE_OPACITY = 0.35
+ACCENT_POINTS = {ColourBy.SEGMENT, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.RGB}
+"""Colourings whose colours the selection may cover; others are measured values."""
+
+
+class Decorations:
+    """Groups of actors; each group is made anew when what it shows has changed.
+
+    `layers` are the renderers: the first among the points, the second over them.
+    """
+
+    def __init__(self, layers: list[vtkRenderer]) -> None:
+        self._layers = layers
+        self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
+
+    def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
+        """Show the decorations of `state` where they differ from `before`."""
+
+        old, new = before.view, state.view
+        hidden = old.hidden_elements != new.hidden_elements
+        base = everything or hidden or state.result is not before.result
+        if base or old.show_axes != new.show_axes:
+            self._replace("axes", self._axes(state))
+        if base or old.show_surfaces != new.show_surfaces:
+            self._replace("surfaces", self._surfaces(state))
+        selected = base or state.selection != before.selection
+        if selected or old.show_ellipses != new.show_ellipses:
+            self._replace("ellipses", self._ellipses(state))
+        if selected or old.colour_by != new.colour_by or old.show_points != new.show_points:
+            self._replace("highlight", self._highlight(state))
+        if everything or state.profile is not before.profile:
+            self._replace("profile", self._profile(state))
+
+    def clear(self) -> None:
+        """Take all away."""
+        for name in list(self._groups):
+            self._replace(name, ())
+
+    def _replace(self, name: str, actors: Iterable[tuple[int, vtkActor]]) -> None:
+        for layer, actor in self._groups.pop(name, ()):
+            layer.RemoveActor(actor)
+        self._groups[name] = [(self._layers[i], actor) for i, actor in actors]
+        for layer, actor in self._groups[name]:
+            layer.AddActor(actor)
+
+    def _axes(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        elements = visible_elements(state.result, state.view.hidden_elements)
+        if state.view.show_axes and elements:
+            yield 1, _lines(shapes.axis_lines(elements), theme.colour("text"), 1.0, 0.55)
+
+    def _surfaces(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        elements = visible_elements(state.result, state.view.hidden_elements)
+        if state.view.show_surfaces and elements:
+            yield 0, _surface(shapes.surfaces(elements), QColor("#8fa3bd"))
+
+    def _ellipses(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        selected = state.selection.element_id
+        if not (state.view.show_ellipses and state.result):
+            return
+        profiles = state.result.profiles
+        if selected:
+            profiles = profiles.of_element(selected, OWN_STACK)
+        else:
+            shown = [
+                e.element_id for e in visible_elements(state.result, state.view.hidden_elements)
+            ]
+            mask = np.isin(profiles.element_id, shown) & (profiles.stack_id == OWN_STACK)
+            profiles = profiles[mask]
+        if len(profiles):
+            yield 0, _lines(shapes.ellipse_lines(profiles), theme.colour("text"), 1.0, 0.8)
+
+    def _highlight(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        element = selected_element(state)
+        if element is None:
+            return
+        accent = theme.colour("accent")
+        colour_by = effective(state.view.colour_by, state.cloud, state.result)
+        if colour_by in ACCENT_POINTS and state.view.show_points:
+            rows = np.flatnonzero(state.result.element_id == element.element_id)
+            rows = rows[:: max(1, -(-len(rows) // MAX_HIGHLIGHTED))]
+            if len(rows):
+                actor = _points(state.cloud.xyz[rows], accent)
+                actor.GetProperty().SetPointSize(3.0)
+                yield 0, actor
+        yield 1, _lines(shapes.axis_lines((element,)), accent, 2.5)
+        yield 1, _lines(shapes.end_rings(element), accent, 2.0)
+
+    def _profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        if state.profile is None:
+            return
+        if len(state.profile_xyz):
+            points = _points(state.profile_xyz, theme.colour("text"))
+            points.GetProperty().SetPointSize(4.0)
+            yield 1, points
+        ring = shapes.ellipse_lines(state.profile)
+        if ring.n_points:
+            yield 1, _lines(ring, theme.colour("accent"), 3.0)
+
+
+def selected_element(state: SceneState) -> Element | None:
+    """The selected element, if there is one."""
+    selected = state.selection.element_id
+    if state.result is None or not selected:
+        return None
+    return state.result.element(selected)
+
+
+def _lines(mesh: pv.PolyData, colour: QColor, width: float, opacity: float = 1.0) -> vtkActor:
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(mesh)
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    _paint(actor, colour)
+    actor.GetProperty().LightingOff()
+    actor.GetProperty().SetLineWidth(width)
+    actor.GetProperty().SetOpacity(opacity)
+    return actor
+
+
+def _surface(mesh: pv.PolyData, colour: QColor) -> vtkActor:
+    mapper = vtkPolyDataMapper()
+    mapper.SetInputData(mesh)
+    mapper.ScalarVisibilityOff()
+    actor = vtkActor()
+    actor.SetMapper(mapper)
+    _paint(actor, colour)
+    actor.GetProperty().SetOpacity(SURFACE_OPACITY)
+    actor.GetProperty().SetInterpolationToPhong()
+    actor.GetProperty().BackfaceCullingOn()
+    return actor
+
+
+def _points(xyz: np.ndarray, colour: QColor) -> vtkActor:
+    colours = np.broadcast_to(np.array(colour.getRgb()[:3], np.uint8), (len(xyz), 3)).copy()
+    return point_actor(np.ascontiguousarray(xyz, np.float32), colours)
+
+
+def _paint(actor: vtkActor, colour: QColor) -> None:
+    actor.GetProperty().SetColor(colour.redF(), colour.greenF(), colour.blueF())

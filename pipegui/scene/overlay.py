@@ -1,0 +1,231 @@
+"""What is written over the picture: labels, legend, scale bar, directions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRect, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QWidget
+
+from pipecore.geometry import Array
+from pipegui import theme
+from pipegui.scene.legend import Legend
+from pipegui.scene.pose import Pose
+from pipegui.scene.projection import Projection
+from pipegui.theme import SPACING
+
+ICON = 16
+LEADER = 36
+SCALE_BAR_PX = 140
+TRIAD_PX = 30
+SCALE_HEIGHT = 168
+SCALE_WIDTH = 14
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A deformation's name at its peak."""
+
+    deformation_id: int
+    text: str
+    icon: QIcon
+    colour: QColor
+    anchor: Array
+    is_selected: bool = False
+
+
+def round_length(metres: float) -> float:
+    """Return the largest of 1, 2, 5 × 10ⁿ that is at most `metres`."""
+    decade = 10.0 ** np.floor(np.log10(metres))
+    return float(decade * max(m for m in (1, 2, 5) if m * decade <= metres * (1 + 1e-9)))
+
+
+def length_text(metres: float) -> str:
+    """Return a round length in the unit that reads best."""
+    return f"{metres:g} m" if metres >= 1 else f"{1000 * metres:g} mm"
+
+
+def place_box(
+    anchor: QPointF, size: QSize, area: QRect, taken: list[QRectF], leader: float = LEADER
+) -> QRectF | None:
+    """Return where a label of `size` is free of others around its anchor, or None.
+
+    Tried are places up and to the sides first, near before far.
+    """
+    for reach in (leader, 2 * leader, 3.5 * leader):
+        for degrees in (60, 120, 25, 155, -25, 205, -60, 240):
+            angle = np.deg2rad(degrees)
+            x = anchor.x() + reach * np.cos(angle)
+            y = anchor.y() - reach * np.sin(angle)
+            left = x if np.cos(angle) > 0 else x - size.width()
+            box = QRectF(left, y - size.height() / 2, size.width(), size.height())
+            room = box.adjusted(-4, -4, 4, 4)
+            if QRectF(area).contains(room) and not any(room.intersects(t) for t in taken):
+                return box
+    return None
+
+
+class Overlay(QWidget):
+    """Lies over the canvas and is transparent to the mouse."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self.labels: tuple[Label, ...] = ()
+        self.legend: Legend | None = None
+        self._projection: Projection | None = None
+        self._pose: Pose | None = None
+        self._targets: list[tuple[QRectF, int]] = []
+
+    def follow(self, projection: Projection, pose: Pose) -> None:
+        """Take the camera of the picture that is being drawn."""
+        self._projection, self._pose = projection, pose
+        self.update()
+
+    def deformation_at(self, position: QPointF) -> int:
+        """Id of the deformation whose label or mark is there, or 0."""
+        return next((i for box, i in self._targets if box.contains(position)), 0)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """Write everything."""
+        if self._projection is None or self._pose is None:
+            return
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        taken = [self._draw_triad(painter, self._pose)]
+        taken.append(self._draw_scale_bar(painter, self._projection, self._pose))
+        if self.legend is not None:
+            taken.append(self._draw_legend(painter, self.legend))
+        self._draw_labels(painter, self._projection, taken)
+        painter.end()
+
+    # Labels
+
+    def _draw_labels(self, painter: QPainter, projection: Projection, taken: list[QRectF]) -> None:
+        self._targets = []
+        if not self.labels:
+            return
+        area = self.rect()
+        pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
+        order = sorted(range(len(self.labels)), key=lambda i: not self.labels[i].is_selected)
+        marks = []
+        for i in order:
+            anchor = QPointF(*pixels[i]) if np.isfinite(pixels[i]).all() else QPointF(-1, -1)
+            if not QRectF(area).contains(anchor):
+                continue
+            label = self.labels[i]
+            width = painter.fontMetrics().horizontalAdvance(label.text) + ICON + 3 * SPACING
+            box = place_box(anchor, QSize(width, 3 * SPACING), area, taken)
+            marks.append((anchor, box, label))
+            self._targets.append((QRectF(anchor.x() - 7, anchor.y() - 7, 14, 14), i))
+            if box is not None:
+                taken.append(box)
+                self._targets.append((box, i))
+        for anchor, box, label in reversed(marks):
+            self._draw_label(painter, anchor, box, label)
+        self._targets = [(box, self.labels[i].deformation_id) for box, i in self._targets]
+
+    def _draw_label(
+        self, painter: QPainter, anchor: QPointF, box: QRectF | None, label: Label
+    ) -> None:
+        line = theme.colour("accent") if label.is_selected else label.colour
+        if box is not None:
+            edge = QPointF(
+                float(np.clip(anchor.x(), box.left(), box.right())),
+                float(np.clip(anchor.y(), box.top(), box.bottom())),
+            )
+            painter.setPen(QPen(line, 1.5))
+            painter.drawLine(anchor, edge)
+        painter.setPen(QPen(theme.colour("base"), 1.5))
+        painter.setBrush(line)
+        painter.drawEllipse(anchor, 4.5, 4.5)
+        if box is None:
+            return
+        painter.setPen(QPen(line, 2.0 if label.is_selected else 1.0))
+        painter.setBrush(_paper())
+        painter.drawRoundedRect(box, 4, 4)
+        icon = QRect(
+            round(box.left()) + SPACING - 2, round(box.center().y()) - ICON // 2, ICON, ICON
+        )
+        label.icon.paint(painter, icon)
+        painter.setPen(theme.colour("text"))
+        text = box.adjusted(ICON + 1.5 * SPACING, 0, 0, 0)
+        painter.drawText(text, Qt.AlignmentFlag.AlignVCenter, label.text)
+
+    # Legend
+
+    def _draw_legend(self, painter: QPainter, legend: Legend) -> QRectF:
+        metrics = painter.fontMetrics()
+        line = metrics.height() + 4
+        texts = [t for _, t in legend.ticks] + [t for _, t in legend.swatches]
+        inner = max([metrics.horizontalAdvance(t) for t in texts], default=0)
+        width = max(metrics.horizontalAdvance(legend.title), inner + 3 * SPACING) + 2 * SPACING
+        rows = SCALE_HEIGHT + line if legend.scale is not None else line * len(legend.swatches)
+        height = line + rows + SPACING
+        box = QRectF(self.width() - width - 1.5 * SPACING, 1.5 * SPACING, width, height)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(_paper())
+        painter.drawRoundedRect(box, 4, 4)
+        painter.setPen(theme.colour("text"))
+        left, top = box.left() + SPACING, box.top() + SPACING / 2
+        painter.drawText(QPointF(left, top + metrics.ascent()), legend.title)
+        top += line
+        if legend.scale is not None:
+            self._draw_scale(painter, legend, QPointF(left, top + line / 2))
+        for (red, green, blue), text in legend.swatches:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(red, green, blue))
+            painter.drawRoundedRect(QRectF(left, top + 3, 12, 12), 2, 2)
+            painter.setPen(theme.colour("text"))
+            painter.drawText(QPointF(left + 2.5 * SPACING, top + metrics.ascent()), text)
+            top += line
+        return box
+
+    def _draw_scale(self, painter: QPainter, legend: Legend, corner: QPointF) -> None:
+        strip = np.ascontiguousarray(legend.scale[::-1])
+        image = QImage(strip.data, 1, len(strip), 3, QImage.Format.Format_RGB888)
+        bar = QRectF(corner.x(), corner.y(), SCALE_WIDTH, SCALE_HEIGHT)
+        painter.drawImage(bar, image)
+        metrics = painter.fontMetrics()
+        painter.setPen(theme.colour("text"))
+        for share, text in legend.ticks:
+            y = bar.bottom() - share * bar.height()
+            painter.drawLine(QPointF(bar.right(), y), QPointF(bar.right() + 4, y))
+            painter.drawText(QPointF(bar.right() + SPACING, y + metrics.ascent() / 2 - 1), text)
+
+    # Scale and directions
+
+    def _draw_triad(self, painter: QPainter, pose: Pose) -> QRectF:
+        reach = TRIAD_PX + 16
+        middle = QPointF(SPACING + reach, self.height() - SPACING - reach)
+        axes = zip(np.eye(3), "ENH", strict=True)
+        for axis, name in sorted(axes, key=lambda a: -(a[0] @ pose.forward)):
+            tip = QPointF(axis @ pose.right, -(axis @ pose.up))
+            fade = QColor(theme.colour("text"))
+            fade.setAlphaF(1.0 if axis @ pose.forward < 0.1 else 0.55)
+            painter.setPen(QPen(fade, 1.6))
+            painter.drawLine(middle, middle + TRIAD_PX * tip)
+            at = middle + (TRIAD_PX + 9) * tip
+            box = QRectF(at.x() - 8, at.y() - 8, 16, 16)
+            if np.hypot(tip.x(), tip.y()) > 0.25:
+                painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
+        return QRectF(middle.x() - reach, middle.y() - reach, 2 * reach, 2 * reach)
+
+    def _draw_scale_bar(self, painter: QPainter, projection: Projection, pose: Pose) -> QRectF:
+        pixel = projection.pixel_size(pose.distance)
+        metres = round_length(SCALE_BAR_PX * pixel)
+        length = metres / pixel
+        left = 2 * (TRIAD_PX + 16) + 3 * SPACING
+        y = self.height() - 2.5 * SPACING
+        painter.setPen(QPen(theme.colour("text"), 1.6))
+        for a, b in (((0, 0), (length, 0)), ((0, -4), (0, 4)), ((length, -4), (length, 4))):
+            painter.drawLine(QPointF(left + a[0], y + a[1]), QPointF(left + b[0], y + b[1]))
+        box = QRectF(left, y - 26, length, 20)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, length_text(metres))
+        return box.adjusted(-4, 0, 4, 14)
+
+
+def _paper() -> QColor:
+    paper = QColor(theme.colour("base"))
+    paper.setAlpha(225)
+    return paper

@@ -1,0 +1,251 @@
+"""The 3D view: takes a `SceneState`, shows it, and says what the user points at."""
+
+import math
+
+import numpy as np
+from PySide6.QtCore import QPointF, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from pipecore.geometry import Array
+from pipecore.report.format import format_measure
+from pipecore.types import NO_ID, Deformation, DeformationKind
+from pipegui import theme
+from pipegui.colours import VERDICT
+from pipegui.scene import pose as poses
+from pipegui.scene.aiming import aim
+from pipegui.scene.canvas import Canvas
+from pipegui.scene.colouring import colour_points, visible_points
+from pipegui.scene.decorations import Decorations
+from pipegui.scene.legend import make_legend
+from pipegui.scene.overlay import Label, Overlay
+from pipegui.scene.picking import pick_point
+from pipegui.scene.point_layer import PointLayer
+from pipegui.scene.pose import Pose
+from pipegui.view_state import SceneState
+
+BACKGROUND = {False: ("#eef1f4", "#fbfcfd"), True: ("#15181b", "#262b31")}
+"""Bottom and top, in light and dark."""
+HOVER_MS = 60
+COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack")
+
+
+class SceneView(QWidget):
+    """Shows one scan with its result."""
+
+    picked = Signal(int)
+    """Index of the clicked point in the cloud, -1 for none."""
+    hovered = Signal(int)
+    """Index of the point under the resting cursor, -1 for none."""
+    deformation_picked = Signal(int)
+    """Id of the deformation whose label was clicked."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._state = SceneState()
+        self._dark: bool | None = None
+        self._is_picking = False
+        self._hovered = -1
+        self.canvas = Canvas(self)
+        self.overlay = Overlay(self.canvas)
+        self.points = PointLayer(self.canvas.layers[0])
+        self._decorations = Decorations(self.canvas.layers)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.canvas)
+        self._hover_at: QPointF | None = None
+        self._hover_timer = QTimer(self, singleShot=True, interval=HOVER_MS)
+        self._hover_timer.timeout.connect(self._hover)
+        self.canvas.point_under = self._point_under
+        self.canvas.clicked.connect(self._click)
+        self.canvas.hovered.connect(self._wait_for_hover)
+        self.canvas.left.connect(self._stop_hovering)
+        self.canvas.before_frame.connect(self._prepare_frame)
+        self.canvas.drawn.connect(self.points.learn)
+        self.setAccessibleName("3D view")
+
+    # States
+
+    def apply(self, state: SceneState) -> None:
+        """Show `state`; only what differs from the last one is done anew."""
+        before, self._state = self._state, state
+        is_new_theme = self._dark != theme.is_dark()
+        self._dark = theme.is_dark()
+        if is_new_theme:
+            self._set_background()
+        is_new_cloud = state.cloud is not before.cloud
+        self._update_points(state, before, is_new_cloud=is_new_cloud, is_new_theme=is_new_theme)
+        self._decorations.update(state, before, everything=is_new_theme or is_new_cloud)
+        self._update_overlay(state)
+        if is_new_cloud and state.scan_key != before.scan_key:
+            self.fit()
+        elif state.selection != before.selection:
+            self._aim(state)
+        self.canvas.draw()
+
+    def _update_points(
+        self, state: SceneState, before: SceneState, *, is_new_cloud: bool, is_new_theme: bool
+    ) -> None:
+        cloud, view = state.cloud, state.view
+        if cloud is None:
+            self.points.clear_actors()
+            return
+        if is_new_cloud:
+            self.points.set_cloud(cloud)
+        is_new_result = state.result is not before.result
+        is_recoloured = (
+            is_new_theme
+            or is_new_result
+            or any(getattr(view, name) != getattr(before.view, name) for name in COLOURING)
+        )
+        hidden = view.hidden_elements
+        is_other_subset = hidden != before.view.hidden_elements or (hidden and is_new_result)
+        if not (is_new_cloud or is_recoloured or is_other_subset):
+            return
+        colours = colour_points(cloud, state.result, view, dark=bool(self._dark))
+        if is_new_cloud or is_other_subset:
+            self.points.set_points(cloud, visible_points(state.result, hidden), colours)
+        else:
+            self.points.set_colours(colours)
+
+    def _update_overlay(self, state: SceneState) -> None:
+        self.overlay.legend, self.overlay.labels = None, ()
+        if state.cloud is not None and state.view.show_points:
+            self.overlay.legend = make_legend(state.cloud, state.result, state.view)
+        if state.result is not None and state.view.show_labels:
+            self.overlay.labels = tuple(
+                _label(d, is_selected=d.deformation_id == state.selection.deformation_id)
+                for d in state.result.deformations
+                if d.element_id not in state.view.hidden_elements
+            )
+
+    def _set_background(self) -> None:
+        bottom, top = (QColor(c) for c in BACKGROUND[bool(self._dark)])
+        back = self.canvas.layers[0]
+        back.SetBackground(bottom.redF(), bottom.greenF(), bottom.blueF())
+        back.SetBackground2(top.redF(), top.greenF(), top.blueF())
+        back.GradientBackgroundOn()
+
+    # Camera
+
+    def fit(self) -> None:
+        """Fly to where everything is in view."""
+        if len(self.points.xyz):
+            self._fly(self._fitted(self.canvas.pose))
+
+    def set_standard_view(self, name: str) -> None:
+        """Fly to look at everything from a standard side, such as "top" or "iso"."""
+        self._fly(self._fitted(poses.standard_view(self.canvas.pose, name)))
+
+    def view_direction(self) -> Array:
+        """Unit vector in which the camera looks."""
+        return self.canvas.pose.forward
+
+    def _fitted(self, pose: Pose) -> Pose:
+        sample = self.points.quick_xyz[:20_000].astype(np.float64)
+        # A few stray points far away must not make the rest small.
+        low, high = np.percentile(sample, [0.2, 99.8], axis=0)
+        margin = 0.2 * (high - low)
+        inside = np.all((sample >= low - margin) & (sample <= high + margin), axis=1)
+        return poses.framing(pose, sample[inside], self.canvas.aspect)
+
+    def _fly(self, pose: Pose) -> None:
+        self.canvas.fly_to(pose, fly=self._state.view.fly)
+
+    def _aim(self, state: SceneState) -> None:
+        pose = aim(state, self.canvas.pose, self.canvas.aspect, stay_if_seen=self._is_picking)
+        if pose is not None:
+            self._fly(pose)
+
+    def _prepare_frame(self) -> None:
+        canvas, projection = self.canvas, self.canvas.projection()
+        self.points.show(
+            moving=canvas.is_moving,
+            pixel_size=projection.pixel_size(canvas.pose.distance),
+            visible=self._state.view.show_points,
+        )
+        self.overlay.follow(projection, canvas.pose)
+
+    # Mouse
+
+    def pick(self, position: QPointF) -> int:
+        """Index in the cloud of the point that is seen at `position`, -1 if there is none."""
+        return self._pick(position, self.points.xyz)
+
+    def _pick(self, position: QPointF, xyz: np.ndarray) -> int:
+        if not len(xyz) or not self._state.view.show_points:
+            return -1
+        row = pick_point(xyz, self.canvas.projection(), (position.x(), position.y()))
+        return self.points.cloud_index(row) if row >= 0 else -1
+
+    def _point_under(self, position: QPointF) -> Array | None:
+        index = self._pick(position, self.points.quick_xyz)
+        if index < 0 or self._state.cloud is None:
+            return None
+        return self._state.cloud.xyz[index].astype(np.float64)
+
+    def _click(self, position: QPointF) -> None:
+        # What is clicked is in view: the camera stays unless it sees too little of it.
+        self._is_picking = True
+        try:
+            deformation_id = self.overlay.deformation_at(position)
+            if deformation_id != NO_ID:
+                self.deformation_picked.emit(deformation_id)
+            else:
+                self.picked.emit(self.pick(position))
+        finally:
+            self._is_picking = False
+
+    def _wait_for_hover(self, position: QPointF) -> None:
+        self._hover_at = position
+        if not self._hover_timer.isActive():
+            self._hover_timer.start()
+
+    def _hover(self) -> None:
+        if self._hover_at is None:
+            return
+        index = self._pick(self._hover_at, self.points.quick_xyz)
+        if index >= 0 or self._hovered >= 0:
+            self.hovered.emit(index)
+        self._hovered = index
+
+    def _stop_hovering(self) -> None:
+        self._hover_at = None
+        self._hover_timer.stop()
+        if self._hovered >= 0:
+            self._hovered = -1
+            self.hovered.emit(-1)
+
+    # Qt
+
+    def screenshot(self) -> QImage:
+        """Return the picture with everything that is written over it."""
+        return self.grab().toImage()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Keep the overlay over the whole picture."""
+        super().resizeEvent(event)
+        self.overlay.setGeometry(self.canvas.rect())
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Let go of VTK while its context is there."""
+        self._hover_timer.stop()
+        self._decorations.clear()
+        self.points.clear_actors()
+        self.canvas.close()
+        super().closeEvent(event)
+
+
+def _label(deformation: Deformation, *, is_selected: bool) -> Label:
+    if deformation.kind is DeformationKind.OVALITY and math.isfinite(deformation.ovality):
+        size = format_measure(100 * deformation.ovality, unit="%")
+    else:
+        size = format_measure(1000 * deformation.depth, 1000 * deformation.depth_sd, "mm")
+    return Label(
+        deformation.deformation_id,
+        f"{str(deformation.kind).capitalize()} {size}",
+        theme.verdict_icon(deformation.verdict),
+        QColor(VERDICT[deformation.verdict]),
+        np.asarray(deformation.peak, np.float64),
+        is_selected,
+    )
