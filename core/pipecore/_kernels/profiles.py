@@ -95,17 +95,23 @@ def join_neighbours(
     """Unite neighbouring points start … stop that lie on one curve.
 
     Points are sorted by `keys`, which number the cells of all profiles row by row;
-    start and stop lie between profiles. `reach` holds each point's largest gap.
+    start and stop lie between profiles. `reach` holds each point's largest gap, at least
+    `cell`; a pair joins within the larger of its two.
     """
     for i in range(start, stop):
         rows = int(math.ceil(reach[i] / cell))
-        for row in range(rows + 1):
-            # Each pair is met once, from the point that comes first.
+        # Within a cell each pair is met from the point that comes first; a point that
+        # reaches further looks both ways, since the other may not reach as far.
+        is_far = rows > 1
+        for row in range(-rows if is_far else 0, rows + 1):
             low = keys[i] + row * n_v - rows
             high = keys[i] + row * n_v + rows
-            j = i + 1 if row == 0 else start + np.searchsorted(keys[start:stop], low)
+            if row == 0 and not is_far:
+                j = i + 1
+            else:
+                j = start + np.searchsorted(keys[start:stop], low)
             while j < stop and keys[j] <= high:
-                if j > i and are_joined(
+                if (j > i or (is_far and j < i)) and are_joined(
                     uv[j, 0] - uv[i, 0],
                     uv[j, 1] - uv[i, 1],
                     normals_uvd[i, 0],
