@@ -1,0 +1,163 @@
+"""Cuts through cylinders and spheres, known in closed form."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipecore._kernels import ellipses as kernels
+from tests.core.shapes import random_rotation, unit_rows
+
+# Random numbers wrap around on purpose, which plain numpy warns of.
+pytestmark = [pytest.mark.kernels, pytest.mark.filterwarnings("ignore:overflow encountered")]
+
+
+def axis_of(tilt_deg, azimuth_deg):
+    t, a = np.radians(tilt_deg), np.radians(azimuth_deg)
+    return np.array([np.sin(t) * np.cos(a), np.sin(t) * np.sin(a), np.cos(t)])
+
+
+def cut_cylinder(axis, centre, r, angles):
+    """Points (u, v) and normals (u, v, d) of the cut of a cylinder by the plane d = 0."""
+    e1 = np.cross(axis, [0.3, 0.5, -0.8])
+    e1 /= np.linalg.norm(e1)
+    e2 = np.cross(axis, e1)
+    normals = np.cos(angles)[:, None] * e1 + np.sin(angles)[:, None] * e2
+    points = r * normals - (r * normals[:, 2] / axis[2])[:, None] * axis
+    assert_allclose(points[:, 2], 0.0, atol=1e-12)
+    return np.ascontiguousarray(points[:, :2] + centre), normals
+
+
+def fit(*curves, tolerance=0.004, max_gap=0.04):
+    uv, normals = (np.concatenate(c) for c in zip(*curves, strict=True))
+    starts = np.cumsum([0, *(len(c[0]) for c in curves)])
+    fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
+    kernels.fit_curves(uv, normals, starts, 0, len(curves), tolerance, max_gap, fits)
+    return fits
+
+
+def test_that_the_common_axis_is_the_least_eigenvector_of_the_normals(rng):
+    normals = unit_rows(rng.normal(size=(30, 3)) * [1.0, 0.6, 0.1]) @ random_rotation(rng)
+    chosen = rng.random(30) < 0.7
+    u, v, d, l1, l2 = kernels.common_axis(normals, chosen)
+    values, vectors = np.linalg.eigh(normals[chosen].T @ normals[chosen] / chosen.sum())
+    assert d >= 0
+    assert abs(np.array([u, v, d]) @ vectors[:, 0]) == pytest.approx(1.0, abs=1e-9)
+    assert_allclose([l1, l2], values[:2], atol=1e-12)
+    assert np.isnan(kernels.common_axis(normals, np.arange(30) < 2)).all()
+
+
+def test_that_looking_along_an_axis_is_a_projection(rng):
+    axis = axis_of(rng.uniform(0, 60), rng.uniform(0, 360))
+    uv, normals = rng.normal(size=(10, 2)), unit_rows(rng.normal(size=(10, 3)))
+    x, y, mx, my = np.empty((4, 10))
+    tu, tv = kernels.look_along(uv, normals, *axis, x, y, mx, my)
+    # The view's base: across the tilt, and towards it.
+    across = np.array([-tv, tu, 0.0])
+    towards = np.cross(across, axis)
+    towards *= np.sign(towards @ [tu, tv, 0.0])
+    points = np.column_stack([uv, np.zeros(10)])
+    assert_allclose(np.stack([x, y]), np.stack([points @ across, points @ towards]), atol=1e-12)
+    assert_allclose(np.stack([mx, my]), np.stack([normals @ across, normals @ towards]), atol=1e-12)
+
+
+@pytest.mark.parametrize("tilt_deg", [0.0, 12.0, 35.0, 44.0])
+@pytest.mark.parametrize("arc_deg", [360.0, 170.0, 100.0])
+def test_that_an_exact_cut_gives_back_its_cylinder(rng, tilt_deg, arc_deg):
+    axis = axis_of(tilt_deg, rng.uniform(0, 360))
+    r, centre = rng.uniform(0.02, 0.5), rng.uniform(-5, 5, 2)
+    step = np.radians(arc_deg) / 60
+    angles = rng.uniform(0, 6) + step * np.arange(60)
+    (row,) = fit(cut_cylinder(axis, centre, r, angles), max_gap=1.5 * step * r)
+    assert_allclose(row[:2], centre, atol=1e-8)
+    assert_allclose(row[2:5], axis, atol=1e-7)
+    assert row[5] == pytest.approx(r, abs=1e-8)
+    assert row[6] < 1e-8
+    seen = 360.0 if arc_deg == 360.0 else np.degrees(59 * step)
+    assert np.degrees(row[7]) == pytest.approx(seen, abs=1e-4)
+    assert row[8] == 60
+    assert row[9] == pytest.approx(0.0, abs=1e-12)
+    assert row[11] == 1.0
+    # On a cylinder the normals of a cut meet on its axis, abreast of the cut's middle.
+    meeting = row[12:15] - [*centre, 0.0]
+    if np.isfinite(row[12]):
+        assert np.linalg.norm(np.cross(meeting, axis)) < 1e-5
+
+
+def test_that_the_normals_of_a_cut_sphere_meet_in_its_centre(rng):
+    big_r, centre = 0.3, rng.uniform(-2, 2, 2)
+    heights = np.array([0.02, 0.08, -0.12])
+    curves = []
+    for h in heights:
+        angles = np.linspace(0, rng.uniform(3, 6), 40)
+        rho = np.sqrt(big_r**2 - h**2)
+        uv = centre + rho * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        rim = np.column_stack([uv - centre, np.full(40, h)])
+        curves.append((uv, rim / big_r))
+    fits = fit(*curves)
+    assert_allclose(fits[:, 12:14], np.tile(centre, (3, 1)), atol=1e-8)
+    assert_allclose(fits[:, 14], -heights, atol=1e-8)
+    assert_allclose(fits[:, 15], big_r, atol=1e-8)
+
+
+def test_that_too_few_points_or_parallel_normals_give_no_fit(rng):
+    angles = np.linspace(0, 3, 4)
+    wall = np.column_stack([np.linspace(0, 1, 20), np.zeros(20)])
+    fits = fit(
+        cut_cylinder(axis_of(10, 0), np.zeros(2), 0.1, angles),
+        (wall, np.tile([0.0, 1.0, 0.0], (20, 1))),
+    )
+    assert np.isnan(fits).all()
+
+
+def test_that_the_covered_arc_is_all_but_the_wide_gaps(rng):
+    for _ in range(20):
+        angles = np.sort(rng.uniform(-np.pi, np.pi, rng.integers(1, 12)))
+        max_gap = rng.uniform(0.3, 1.5)
+        following = np.append(angles[1:], angles[0] + 2 * np.pi)
+        gaps = following - angles
+        expected = gaps[gaps <= max_gap].sum()
+        assert kernels.covered_arc(angles, max_gap) == pytest.approx(expected, abs=1e-9)
+
+
+def test_that_a_curve_of_two_pipes_is_split_into_its_pipes_and_a_single_one_left_whole(rng):
+    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    small = cut_cylinder(axis_of(5, 40), np.array([0.0, 0.0]), 0.06, angles)
+    large = cut_cylinder(axis_of(20, 200), np.array([0.17, 0.0]), 0.11, angles)
+    shuffled = rng.permutation(80)
+    both = [np.concatenate(pair)[shuffled] for pair in zip(small, large, strict=True)]
+    origin = np.repeat([0, 1], 40)[shuffled]
+    uv = np.concatenate([both[0], small[0]])
+    normals = np.concatenate([both[1], small[1]])
+    piece = np.zeros(120, np.int64)
+    kernels.split_curves(
+        uv, normals, np.array([0, 80, 120]), 0, 2, 6, 0.004, 0.9, np.cos(np.pi / 4), 5.0, 60, 6,
+        piece,
+    )  # fmt: skip
+    assert (piece[80:] == 0).all()
+    labels = [piece[:80][origin == k] for k in (0, 1)]
+    winners = [np.bincount(label).argmax() for label in labels]
+    assert 0 not in winners
+    assert winners[0] != winners[1]
+    for label, winner in zip(labels, winners, strict=True):
+        assert (label == winner).mean() > 0.9
+
+
+def test_that_the_best_circle_has_most_points_and_only_free_ones(rng):
+    angles = np.linspace(0, 2 * np.pi, 30, endpoint=False)
+    many = cut_cylinder(axis_of(0, 0), np.zeros(2), 0.1, angles)
+    few = cut_cylinder(axis_of(0, 0), np.array([0.5, 0.0]), 0.05, angles[::3])
+    uv, normals = (np.concatenate(p) for p in zip(many, few, strict=True))
+    inliers = np.empty(40, np.bool_)
+
+    def best(free):
+        return kernels.best_circle(
+            uv, normals, free, 0.003, 0.9, np.cos(np.pi / 4), 5.0, 60, 7, inliers
+        )
+
+    free = np.ones(40, np.bool_)
+    assert best(free) == 30
+    assert list(np.flatnonzero(inliers)) == list(range(30))
+    free[:30] = False
+    assert best(free) == 10
+    assert list(np.flatnonzero(inliers)) == list(range(30, 40))
+    assert best(np.zeros(40, np.bool_)) == 0
