@@ -11,6 +11,8 @@ from pipecore.progress import Progress
 
 REACH = 3.5
 """Centres join within this many profile widths of each other, along the axis."""
+WIDE_REACH = 0.25
+"""Wide pipes look at least this many radii ahead: ribs and flanges interrupt them."""
 MAX_TURN_COS = np.cos(np.deg2rad(15.0))
 """Their axes differ by less than this angle."""
 MAX_RADIUS_CHANGE = 0.06
@@ -40,7 +42,7 @@ def join_centres(ellipses: Ellipses, width: float, progress: Progress) -> NDArra
         return np.empty(0, np.int32)
     tree = cKDTree(ellipses.centre)
     # Wide pipes have coarser centres, so they look further; each size class by itself.
-    reach = np.maximum(REACH * width, MAX_OFFSET * ellipses.radius)
+    reach = np.maximum(REACH * width, WIDE_REACH * ellipses.radius)
     links = []
     size_class = np.ceil(np.log2(reach / (REACH * width))).astype(int)
     for k in np.unique(size_class):

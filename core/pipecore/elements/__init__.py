@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
+from pipecore.elements.fittings import End, propose_bends, propose_flanges, propose_reducers
 from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.pieces import Piece, find_pieces
+from pipecore.elements.pieces import LONG_PIECE, Piece, find_pieces
 from pipecore.elements.refine import Fitted, refine_piece
 from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
@@ -22,11 +23,17 @@ Array = NDArray[np.float64]
 
 MIN_COVERAGE = 0.5
 """Share of an element's length that must be covered by points."""
-MIN_ARC = np.deg2rad(75.0)
+MIN_ARC = np.deg2rad(55.0)
+SURE_ARC, SHARP_RADIUS_SD = np.deg2rad(100.0), 0.010
+"""On shorter arcs the points must carry the radius to this share of it."""
 MAX_RADIUS_SD = 0.04
 """Largest standard deviation of a radius, as a share of it."""
 MAX_MISFIT = 0.015
 """Largest root mean square by which a section leaves circle and oval, as a share of the radius."""
+MAX_SPHERE_MISFIT = 0.001
+"""The same for spheres, over patches of the surface: vessel heads are flatter on top."""
+MIN_TAPER_CHANGE = 0.06
+"""A cone's radius changes at least by this share."""
 FLANGE_RATIO = (1.12, 2.8)
 FLANGE_LENGTH = 0.9
 """A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
@@ -59,10 +66,11 @@ def build_elements(
     Points that one element takes are no longer there for the next, so that every
     surface is reported once.
     """
-    fitted = refine_pieces(pieces, nearby, settings, progress)
+    fitted, links = refine_pieces(pieces, nearby, settings, progress)
     axes = [f.axis for f in fitted]
-    spans = [Span(f.axis, f.radii) for f in fitted]
-    links = []
+    for fitting, straight in links:
+        axes[straight], axes[fitting] = _trimmed_to_fitting(axes[straight], axes[fitting])
+    spans = [Span(axis, f.radii) for axis, f in zip(axes, fitted, strict=True)]
     for i, end_i, j, end_j in meeting_ends(spans):
         links.append((i, j))
         axes[i], axes[j] = _trimmed(axes[i], end_i, axes[j], end_j, fitted[i].fit.model.radius)
@@ -75,22 +83,92 @@ def build_elements(
 
 def refine_pieces(
     pieces: list[Piece], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
-) -> list[Fitted]:
-    """Refine the pieces with most ellipses first; drop what does not hold."""
-    is_free = np.ones(len(nearby.surface.xyz), np.bool_)
-    fitted = []
-    # Equal counts are told apart by place, not by the order in which they were found.
-    ordered = sorted(
-        pieces, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
-    )
-    for i, piece in enumerate(ordered):
-        progress.update("elements", 0.3 + 0.7 * i / len(ordered))
-        found = refine_piece(piece, nearby, is_free)
-        if found is not None and is_credible(found, nearby, settings):
-            is_free[found.own] = False
-            fitted.append(found)
+) -> tuple[list[Fitted], list[tuple[int, int]]]:
+    """Refine what was proposed, the surest first; drop what does not hold.
+
+    Returns the fitted pieces, and pairs (fitting, straight) that belong together.
+
+    Long straights come first, then the fittings that they ask for, then the bends,
+    short straights and spheres that the ellipses show on their own.
+    """
+    keeper = _Keeper(nearby, settings)
+    long, rest = _by_support(pieces)
+    for i, piece in enumerate(long):
+        progress.update("elements", 0.3 + 0.35 * i / len(long))
+        keeper.try_piece(piece)
+    progress.update("elements", 0.65)
+    straights = list(keeper.fitted)
+    for piece, ends in propose_bends(straights, nearby):
+        progress.update("elements", 0.67)
+        keeper.try_piece(piece, between=ends)
+    for piece, ends in propose_reducers(straights):
+        keeper.try_piece(piece, between=ends)
+    for i, piece in enumerate(rest):
+        progress.update("elements", 0.7 + 0.25 * i / len(rest))
+        keeper.try_piece(piece)
+    for piece in propose_flanges(list(keeper.fitted), nearby, keeper.is_free):
+        progress.update("elements", 0.97)
+        keeper.try_piece(piece)
     progress.update("elements", 1.0)
-    return fitted
+    return keeper.fitted, keeper.links
+
+
+def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece]]:
+    """Long straights and the rest, each with most ellipses first, spheres last.
+
+    Equal counts are told apart by place, not by the order in which they were found.
+    """
+    ordered = sorted(
+        pieces,
+        key=lambda p: (
+            isinstance(p.model, SphereSurface),
+            -len(p.ellipses),
+            p.model.radius,
+            *p.model.position.tolist(),
+        ),
+    )
+    long = [
+        p
+        for p in ordered
+        if isinstance(p.model, LineSurface)
+        and not p.model.is_tapered
+        and p.high - p.low > LONG_PIECE * p.model.radius
+    ]
+    return long, [p for p in ordered if p not in long]
+
+
+class _Keeper:
+    """Keeps the fitted pieces and which thinned points they have taken."""
+
+    def __init__(self, nearby: NearbyPoints, settings: ElementSettings) -> None:
+        self.fitted: list[Fitted] = []
+        self.is_free = np.ones(len(nearby.surface.xyz), np.bool_)
+        self._nearby = nearby
+        self._settings = settings
+        self.links: list[tuple[int, int]] = []
+        self._joined: set[End] = set()
+
+    def try_piece(self, piece: Piece, between: tuple[End, End] | None = None) -> None:
+        """Refine a piece and keep it if it holds.
+
+        `between` are the ends of straights that it joins: they may have been followed
+        into it, so their points may be used too. Each end is joined once.
+        """
+        usable = self.is_free
+        if between is not None:
+            if not self._joined.isdisjoint(between):
+                return
+            usable = usable.copy()
+            for i, _ in between:
+                usable[self.fitted[i].own] = True
+        found = refine_piece(piece, self._nearby, usable)
+        if found is None or not is_credible(found, self._nearby, self._settings):
+            return
+        if between is not None:
+            self._joined.update(between)
+            self.links += [(len(self.fitted), i) for i, _ in between]
+        self.is_free[found.own] = False
+        self.fitted.append(found)
 
 
 def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) -> bool:
@@ -104,13 +182,19 @@ def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) 
     if found.fit.radius_sd > MAX_RADIUS_SD * radius:
         return False
     if isinstance(model, SphereSurface):
-        return len(found.own) >= 60
+        return len(found.own) >= 60 and found.misfit < MAX_SPHERE_MISFIT * radius + 0.0003
     if found.extent.coverage < MIN_COVERAGE or found.extent.arc < MIN_ARC:
+        return False
+    if found.extent.arc < SURE_ARC and found.fit.radius_sd > SHARP_RADIUS_SD * radius:
         return False
     if found.misfit > MAX_MISFIT * radius + 0.0005:
         return False
     if isinstance(model, ArcSurface):
         return model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
+    if model.is_tapered:
+        change = abs(found.radii[1] - found.radii[0])
+        if change < MIN_TAPER_CHANGE * radius or found.axis.length < 0.3 * radius:
+            return False
     return found.axis.length > 2.0 * nearby.surface.voxel
 
 
@@ -123,6 +207,21 @@ def _kind(found: Fitted) -> ElementKind:
         case ArcSurface():
             return ElementKind.TORUS
     return ElementKind.SPHERE
+
+
+def _trimmed_to_fitting(
+    straight: LineAxis | ArcAxis, fitting: LineAxis | ArcAxis
+) -> tuple[LineAxis | ArcAxis, LineAxis | ArcAxis]:
+    """A straight and the fitting at its nearer end, cut where one takes over from the other."""
+    if not isinstance(straight, LineAxis):
+        return straight, fitting
+    middle = fitting.at(fitting.length / 2)
+    end = int(np.linalg.norm(straight.end - middle) < np.linalg.norm(straight.start - middle))
+    if isinstance(fitting, ArcAxis):
+        corner = straight.at((fitting.centre - straight.start) @ straight.direction)
+        arc_end = int(np.linalg.norm(fitting.end - corner) < np.linalg.norm(fitting.start - corner))
+        return trim_to_tangent(straight, end, fitting, arc_end, 0.5 * straight.length)
+    return straight, fitting
 
 
 def _trimmed(

@@ -42,7 +42,12 @@ class Extent:
 
 
 def find_extent(
-    chainage: Array, clock: Array, residual: Array, length: float, radius: float, voxel: float,
+    chainage: Array,
+    clock: Array,
+    residual: Array,
+    length: float,
+    radius: float,
+    voxel: float,
     sigma: float,
 ) -> Extent | None:
     """Find how far points on a surface cover its axis, outward from where it was proposed.
@@ -84,7 +89,7 @@ def find_extent(
     # Half of normal residuals are below 0.67 sigma.
     off = _median_by_row(np.abs(residual), row, n_rows)
     is_covered = (arc >= max(SHARE_OF_ARC * usual_arc, MIN_COVERED_ARC)) & (
-        off < 1.2 * sigma + min(0.01 * radius, 0.003)
+        off < 1.2 * sigma + min(0.006 * radius, 0.0015)
     )
     covered = np.flatnonzero(is_covered)
     if not is_covered[is_core].any():
@@ -112,6 +117,17 @@ def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:
     used = counts > 0
     median[used] = values[order][starts[used] + counts[used] // 2]
     return median
+
+
+def sphere_misfit(outward: Array, residual: Array) -> float:
+    """How far a surface leaves a sphere, root mean square of the medians of its patches."""
+    azimuth = np.mod(np.arctan2(outward[:, 1], outward[:, 0]), 2 * np.pi)
+    # Patches of equal area: even steps of height and of azimuth.
+    patch = (azimuth / (2 * np.pi) * 12).astype(np.intp) % 12
+    patch = patch * 8 + np.clip((outward[:, 2] + 1.0) * 4, 0, 7).astype(np.intp)
+    median = _median_by_row(residual, patch, 96)
+    used = np.bincount(patch, minlength=96) >= 5
+    return float(np.sqrt(np.mean(median[used] ** 2))) if used.any() else np.inf
 
 
 def section_misfit(clock: Array, residual: Array, arc: float) -> float:

@@ -139,7 +139,9 @@ def _take_lines(
         model, along = _fit_line(e, chosen, is_tapered)
         # The pair's radius was rough: what is off the piece's own pattern stays free.
         expected = model.radius + model.slope * along
-        fits = np.abs(e.radius[chosen] - expected) < SAME_RADIUS * expected + 2 * e.radius_sd[chosen]
+        fits = (
+            np.abs(e.radius[chosen] - expected) < SAME_RADIUS * expected + 2 * e.radius_sd[chosen]
+        )
         chosen, along = chosen[fits], along[fits]
         if len(chosen) >= MIN_ELLIPSES:
             part = _longest_part(along, max(8 * width, 3 * model.radius))

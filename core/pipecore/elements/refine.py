@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.extent import Extent, find_extent, section_misfit
+from pipecore.elements.extent import Extent, find_extent, section_misfit, sphere_misfit
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_direction
 from pipecore.elements.surfaces import (
@@ -201,4 +201,6 @@ def _refine_sphere(model: SphereSurface, nearby: NearbyPoints, is_free: Flags) -
     axis = LineAxis(model.centre + height.min() * upright, upright, float(np.ptp(height)))
     _, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
     arc = float(len(np.unique((clock / (2 * np.pi) * 36).astype(int))) / 36 * 2 * np.pi)
-    return Fitted(fit, axis, near.own, Extent(0.0, axis.length, arc, 1.0, ()), 0.0)
+    residual, _, outward = model.residuals(nearby.surface.xyz[near.own])
+    misfit = sphere_misfit(outward, residual)
+    return Fitted(fit, axis, near.own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)

@@ -126,10 +126,15 @@ def fit_ellipses(
     for_chunks(work, len(curves), 512, "ellipses", progress, span)
     tilt_cos, radius, rms, arc = fits[:, 4], fits[:, 5], fits[:, 6], fits[:, 7]
     max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
+    radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits[:, 8])
     with np.errstate(invalid="ignore"):
+        # A vessel's arc is short, but it holds many points.
+        is_wide_enough = (arc >= np.deg2rad(settings.min_arc_deg)) | (
+            (arc >= np.deg2rad(SHARP_ARC_DEG)) & (radius_sd < SHARP_RADIUS_SD * radius)
+        )
         accepted = (
             (1.0 - tilt_cos <= settings.max_flattening)
-            & (arc >= np.deg2rad(settings.min_arc_deg))
+            & is_wide_enough
             & (rms <= max_rms)
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
@@ -153,6 +158,8 @@ def fit_ellipses(
     return ellipses[aic_ellipse < aic_line]
 
 
+SHARP_ARC_DEG, SHARP_RADIUS_SD = 60.0, 0.012
+"""Arcs down to this many degrees are enough where they carry the radius to this share of it."""
 MIN_RADIAL = 0.75
 """Share of a curve's normals that must point to the centre."""
 MAX_OFF_AXIS = 0.35
