@@ -14,6 +14,7 @@ from pipecore.types import PointCloud
 
 SMALLEST_VOXEL = 0.003
 """Thinning finer than 3 mm keeps noise, not shape."""
+_HASH_FACTORS = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +42,21 @@ def median_spacing(xyz: NDArray[np.floating], n_sample: int = 4000, n_neighbours
     From the radius of the disc that holds `n_neighbours` points around sampled points:
     close pairs of overlapping scans do not make it smaller than it is.
     """
+    if len(xyz) < 2:
+        return 0.0
     tree = cKDTree(xyz)
-    sample = xyz[np.linspace(0, len(xyz) - 1, min(n_sample, len(xyz))).astype(np.intp)]
+    sample = xyz[_sample_by_place(xyz, min(n_sample, len(xyz)))]
     n_neighbours = min(n_neighbours, len(xyz) - 1)
     reach, _ = tree.query(sample, n_neighbours + 1)
     return float(np.median(reach[:, -1]) * np.sqrt(np.pi / (n_neighbours + 1)))
+
+
+def _sample_by_place(xyz: NDArray[np.floating], n_sample: int) -> NDArray[np.intp]:
+    """Positions of points drawn by a hash of their coordinates, so in any order the same."""
+    bits = np.ascontiguousarray(xyz, np.float64).view(np.uint64)
+    mixed = bits @ np.array(_HASH_FACTORS, np.uint64)
+    mixed = (mixed ^ (mixed >> np.uint64(31))) * np.uint64(_HASH_FACTORS[0])
+    return np.argpartition(mixed, n_sample - 1)[:n_sample]
 
 
 def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> ThinnedCloud:
