@@ -99,17 +99,14 @@ def join_neighbours(
     `cell`; a pair joins within the larger of its two.
     """
     for i in range(start, stop):
-        rows = int(math.ceil(reach[i] / cell))
+        rows = math.ceil(reach[i] / cell)
         # Within a cell each pair is met from the point that comes first; a point that
         # reaches further looks both ways, since the other may not reach as far.
         is_far = rows > 1
         for row in range(-rows if is_far else 0, rows + 1):
             low = keys[i] + row * n_v - rows
             high = keys[i] + row * n_v + rows
-            if row == 0 and not is_far:
-                j = i + 1
-            else:
-                j = start + np.searchsorted(keys[start:stop], low)
+            j = i + 1 if row == 0 and not is_far else start + np.searchsorted(keys[start:stop], low)
             while j < stop and keys[j] <= high:
                 if (j > i or (is_far and j < i)) and are_joined(
                     uv[j, 0] - uv[i, 0],
