@@ -1,5 +1,6 @@
 """Cutting profiles, joining points and uniting groups, against plain twins."""
 
+import itertools
 import math
 
 import numpy as np
@@ -95,7 +96,7 @@ def test_that_joined_points_are_the_components_of_the_graph_of_neighbours(
     normals, reach = normals[order], reach[order]
     parents = np.arange(n)
     bounds = np.searchsorted(profile, [0, 2, n_profiles])
-    for start, stop in zip(bounds[:-1], bounds[1:], strict=True):
+    for start, stop in itertools.pairwise(bounds):
         profiles.join_neighbours(
             keys, n_v, cell, uv, normals, reach,
             -1.0 if corner_deg is None else np.cos(np.radians(corner_deg)),

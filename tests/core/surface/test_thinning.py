@@ -1,0 +1,75 @@
+"""Thinning: means of cubes, whatever the order of the points."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pipecore.geometry import LineAxis
+from pipecore.progress import NoProgress
+from pipecore.settings import ThinningSettings
+from pipecore.surface import median_spacing, thin
+from pipecore.types import PointCloud
+from tests.core.shapes import cloud_of, plane, random_direction, tube
+
+
+def pipe(rng, **kwargs):
+    axis = LineAxis(rng.normal(size=3), random_direction(rng), 0.5)
+    return tube(rng, axis, 0.1, noise=0.002, spacing=0.005, **kwargs)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("voxel_mm", [0.0, 10.0])
+def test_that_shuffled_points_thin_to_the_same_bits(rng, dtype, voxel_mm):
+    cloud = cloud_of(pipe(rng))
+    cloud = replace(cloud, xyz=cloud.xyz.astype(dtype))
+    # The automatic voxel comes from a sample of the points, so it is fixed here.
+    settings = ThinningSettings(voxel_mm or 1e3 * median_spacing(cloud.xyz))
+    shuffled = rng.permutation(len(cloud))
+    once = thin(cloud, settings, NoProgress())
+    again = thin(replace(cloud, xyz=cloud.xyz[shuffled]), settings, NoProgress())
+    assert_array_equal(again.xyz, once.xyz)
+    assert_array_equal(again.parent, once.parent[shuffled])
+
+
+def test_that_the_automatic_voxel_does_not_depend_on_the_order_of_the_points(rng):
+    cloud = cloud_of(pipe(rng), pipe(rng))
+    shuffled = np.ascontiguousarray(cloud.xyz[rng.permutation(len(cloud))])
+    assert median_spacing(shuffled) == median_spacing(cloud.xyz)
+
+
+def test_that_a_thinned_point_is_the_mean_of_the_points_that_name_it(rng):
+    cloud = cloud_of(pipe(rng))
+    thinned = thin(cloud, ThinningSettings(20.0), NoProgress())
+    assert len(thinned.xyz) < len(cloud) / 4
+    assert set(thinned.parent) == set(range(len(thinned.xyz)))
+    for k in rng.choice(len(thinned.xyz), 50):
+        members = cloud.xyz[thinned.parent == k]
+        assert_allclose(thinned.xyz[k], members.mean(axis=0), atol=1e-6)
+        assert np.ptp(members, axis=0).max() <= 0.02 + 1e-12
+
+
+def test_that_far_coordinates_cost_no_more_than_a_micrometre(rng):
+    xyz = np.round(cloud_of(pipe(rng)).xyz, 6)
+    shift = np.array([320.0, -640.0, 64.0])
+    near = thin(PointCloud(np.zeros(3), xyz), ThinningSettings(10.0), NoProgress())
+    far = thin(PointCloud(np.zeros(3), xyz + shift), ThinningSettings(10.0), NoProgress())
+    if len(near.xyz) == len(far.xyz):
+        # Cubes count from the lowest point, so that the same points share one.
+        assert_allclose(far.xyz - shift, near.xyz, atol=2e-6)
+    assert abs(len(near.xyz) - len(far.xyz)) < 0.01 * len(near.xyz)
+
+
+def test_that_the_automatic_voxel_is_the_spacing_of_the_scan(rng):
+    for spacing in (0.005, 0.01, 0.02):
+        sheet = plane(rng, np.zeros(3), [100 * spacing, 0, 0], [0, 100 * spacing, 0], spacing)
+        assert median_spacing(sheet[0]) == pytest.approx(spacing, rel=0.12)
+        assert thin(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == median_spacing(
+            sheet[0]
+        )
+
+
+def test_that_scans_are_not_thinned_below_their_noise(rng):
+    sheet = plane(rng, np.zeros(3), [0.1, 0, 0], [0, 0.1, 0], 0.001)
+    assert thin(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == 0.003
