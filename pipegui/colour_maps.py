@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Colours = NDArray[np.uint8]
 
-_INWARD_TO_OUTWARD = ["#123f9e", "#3f74cf", "#86a9dc", "#b9b9b3", "#e59a80", "#d4503a", "#9f1423"]
+_INWARD_TO_OUTWARD = ["#123f9e", "#3a6cc8", "#98a9c2", "#b9b9b3", "#ccaa9d", "#cf4a34", "#9f1423"]
 _LOW_TO_HIGH = ["#432e7a", "#38598c", "#25858e", "#2ab07f", "#85d54a", "#e8e337"]
 _DARK_TO_BRIGHT = ["#2b2b2b", "#f2f2f2"]
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipecore.geometry import Array, unit
-from pipecore.types import Deformation, Element, ElementKind
+from pipecore.types import Deformation, Element, ElementKind, Profiles
 from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.pose import VIEW_ANGLE, Pose
@@ -15,6 +15,10 @@ ELEMENT_MARGIN = 1.6
 """Some of the surroundings help to see where an element is."""
 SMALLEST_SHARE = 0.15
 """Of the picture's height; smaller things do not count as seen well."""
+
+OPEN = 0.35
+"""Ratio of the axes of a circle as seen, from which it looks like one."""
+LOOK_ROUND = np.deg2rad(35)
 
 
 def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> Pose | None:
@@ -34,7 +38,7 @@ def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> 
     if result is None:
         return None
     if state.profile is not None:
-        return _aim_at_profile(state.profile.centre[0], float(state.profile.radius[0]), pose)
+        return _aim_at_profile(state.profile, pose)
     if selection.deformation_id:
         deformation = result.deformation(selection.deformation_id)
         return _aim_at_deformation(
@@ -54,10 +58,23 @@ def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> 
     return poses.framing(pose, points, aspect, ELEMENT_MARGIN)
 
 
-def _aim_at_profile(centre: Array, radius: float, pose: Pose) -> Pose:
-    """Follow from profile to profile without changing the side that is looked at."""
+def _aim_at_profile(profile: Profiles, pose: Pose) -> Pose:
+    """Follow from profile to profile; turn only where the ellipse would look like a line."""
+    radius, normal = float(profile.radius[0]), profile.normal[0]
     distance = float(np.clip(pose.distance, 8 * radius, 24 * radius))
-    return replace(pose, focus=centre, distance=distance)
+    pose = replace(pose, focus=profile.centre[0], distance=distance)
+    turned = [
+        replace(pose, heading=pose.heading + turn, elevation=float(np.clip(tilt, -1.2, 1.2)))
+        for turn, tilt in (
+            (0.0, pose.elevation),
+            (LOOK_ROUND, pose.elevation),
+            (-LOOK_ROUND, pose.elevation),
+            (0.0, pose.elevation + LOOK_ROUND),
+            (0.0, pose.elevation - LOOK_ROUND),
+        )
+    ]
+    open_enough = (p for p in turned if abs(p.forward @ normal) > OPEN)
+    return next(open_enough, max(turned, key=lambda p: abs(p.forward @ normal)))
 
 
 def _aim_at_deformation(

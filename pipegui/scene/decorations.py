@@ -33,7 +33,6 @@ class Decorations:
 
     def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
         """Show the decorations of `state` where they differ from `before`."""
-
         old, new = before.view, state.view
         hidden = old.hidden_elements != new.hidden_elements
         base = everything or hidden or state.result is not before.result
@@ -108,7 +107,7 @@ class Decorations:
             return
         if len(state.profile_xyz):
             points = _points(state.profile_xyz, theme.colour("text"))
-            points.GetProperty().SetPointSize(4.0)
+            points.GetProperty().SetPointSize(3.0)
             yield 1, points
         ring = shapes.ellipse_lines(state.profile)
         if ring.n_points:

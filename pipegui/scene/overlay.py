@@ -115,7 +115,9 @@ class Overlay(QWidget):
                 continue
             label = self.labels[i]
             width = painter.fontMetrics().horizontalAdvance(label.text) + ICON + 3 * SPACING
-            box = place_box(anchor, QSize(width, 3 * SPACING), area, taken)
+            # The selected one is looked at: its label must not cover it.
+            leader = 2.5 * LEADER if label.is_selected else LEADER
+            box = place_box(anchor, QSize(width, 3 * SPACING), area, taken, leader)
             marks.append((anchor, box, label))
             self._targets.append((QRectF(anchor.x() - 7, anchor.y() - 7, 14, 14), i))
             if box is not None:
@@ -198,8 +200,9 @@ class Overlay(QWidget):
     def _draw_triad(self, painter: QPainter, pose: Pose) -> QRectF:
         reach = TRIAD_PX + 16
         middle = QPointF(SPACING + reach, self.height() - SPACING - reach)
+        names: list[QRectF] = []
         axes = zip(np.eye(3), "ENH", strict=True)
-        for axis, name in sorted(axes, key=lambda a: -(a[0] @ pose.forward)):
+        for axis, name in sorted(axes, key=lambda a: a[0] @ pose.forward):
             tip = QPointF(axis @ pose.right, -(axis @ pose.up))
             fade = QColor(theme.colour("text"))
             fade.setAlphaF(1.0 if axis @ pose.forward < 0.1 else 0.55)
@@ -207,7 +210,9 @@ class Overlay(QWidget):
             painter.drawLine(middle, middle + TRIAD_PX * tip)
             at = middle + (TRIAD_PX + 9) * tip
             box = QRectF(at.x() - 8, at.y() - 8, 16, 16)
-            if np.hypot(tip.x(), tip.y()) > 0.25:
+            is_free = not any(box.intersects(other) for other in names)
+            if is_free and np.hypot(tip.x(), tip.y()) > 0.25:
+                names.append(box)
                 painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
         return QRectF(middle.x() - reach, middle.y() - reach, 2 * reach, 2 * reach)
 

@@ -1,0 +1,204 @@
+"""The unrolled deviation map: chainage by clock, inward blue, outward red."""
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Signal
+from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
+from PySide6.QtWidgets import QGraphicsEllipseItem, QGraphicsRectItem, QWidget
+
+from pipecore.geometry import Array
+from pipecore.report.format import format_clock, format_measure
+from pipecore.types import Deformation, DeformationKind
+from pipegui import theme
+from pipegui.colour_maps import DEVIATION, deviation_colours
+from pipegui.colours import VERDICT
+from pipegui.plots.chart import Chart
+from pipegui.plots.unrolled import Unrolled, from_clock, unroll
+from pipegui.theme import SPACING
+from pipegui.view_state import MapState
+
+EMPTY = "Select an element to see its surface unrolled."
+DEGREES = ((-180, "6:00"), (-90, "9:00"), (0, "12:00"), (90, "3:00"), (180, "6:00"))
+WHOLE_ROUND = np.deg2rad(330)
+"""A deformation wider than this goes all the way round."""
+
+
+class DeviationMap(Chart):
+    """Shows the surface of the selected element; clicks say which spot is meant."""
+
+    spot_clicked = Signal(float, float)
+    """Chainage in metres and clock angle in radians."""
+    deformation_clicked = Signal(int)
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(EMPTY, parent)
+        self._state = MapState()
+        self._map: Unrolled | None = None
+        self.scale = ScaleStrip()
+        self.header.addWidget(self.scale)
+        self.header.addStretch(1)
+        self.plot = self.add_plot(0, "Clock", "Chainage, m")
+        self.plot.getAxis("left").setTicks([DEGREES])
+        self.plot.setYRange(-180, 180, padding=0)
+        self.plot.setLimits(yMin=-180, yMax=180)
+        self._image = pg.ImageItem(axisOrder="row-major")
+        self._shapes: list[object] = []
+        self.plot.addItem(self._image)
+        self.on_click(self._click)
+        self.on_hover(self._hover)
+        self.setAccessibleName("Deviation map")
+
+    def apply(self, state: MapState) -> None:
+        """Show `state`."""
+        is_new_theme = self.is_new_theme()
+        before, self._state = self._state, state
+        if state == before and not is_new_theme:
+            return
+        element = state.element
+        has_points = element is not None and bool(np.isfinite(state.deviation).any())
+        self.empty.setText(
+            EMPTY if element is None else f"{element.label} has no points with a deviation."
+        )
+        self.show_filled(has_points)
+        self.scale.set_limit(state.limit_mm)
+        self.readout.clear()
+        if not has_points:
+            self._map = None
+            return
+        is_other = element is not before.element or state.deviation is not before.deviation
+        if is_other:
+            self._map = unroll(element, state.chainage, state.clock, state.deviation)
+        self._draw_image()
+        self._draw_shapes()
+        if is_other:
+            self.plot.setXRange(self._map.start, self._map.start + self._map.length, padding=0.02)
+
+    # Drawing
+
+    def _draw_image(self) -> None:
+        values = self._map.deviation_mm.T
+        colours = deviation_colours(values, self._state.limit_mm)
+        opaque = np.where(np.isfinite(values), 255, 0).astype(np.uint8)
+        self._image.setImage(np.dstack([colours, opaque]))
+        self._image.setRect(QRectF(self._map.start, -180, self._map.length, 360))
+
+    def _draw_shapes(self) -> None:
+        for shape in self._shapes:
+            self.plot.removeItem(shape)
+        self._shapes = []
+        for deformation in self._state.deformations:
+            is_selected = deformation.deformation_id == self._state.selected_deformation
+            colour = theme.colour("accent") if is_selected else QColor(VERDICT[deformation.verdict])
+            for box in self._boxes(deformation):
+                is_round = box.height() < 360
+                shape = (QGraphicsEllipseItem if is_round else QGraphicsRectItem)(box)
+                pen = QPen(colour, 3.0 if is_selected else 2.0)
+                pen.setCosmetic(True)
+                shape.setPen(pen)
+                self._add(shape)
+        if self._state.selected_chainage is not None:
+            line = pg.mkPen(theme.colour("accent"), width=1.5)
+            self._add(pg.InfiniteLine(self._state.selected_chainage, pen=line))
+
+    def _add(self, shape: object) -> None:
+        self.plot.addItem(shape, ignoreBounds=True)
+        self._shapes.append(shape)
+
+    def _boxes(self, deformation: Deformation) -> list[QRectF]:
+        """Where a deformation lies on the map; twice if it goes over the cut at 6:00."""
+        length = deformation.chainage_end - deformation.chainage_start
+        width = float(np.rad2deg(self._angular_width(deformation)))
+        if width >= np.rad2deg(WHOLE_ROUND):
+            return [QRectF(deformation.chainage_start, -180, length, 360)]
+        middle = float(np.rad2deg(from_clock(deformation.clock)))
+        turns = [0] + [t for t in (-360, 360) if abs(middle + t) - width / 2 < 180]
+        return [
+            QRectF(deformation.chainage_start, middle + t - width / 2, length, width) for t in turns
+        ]
+
+    def _angular_width(self, deformation: Deformation) -> float:
+        if deformation.kind in {DeformationKind.OVALITY, DeformationKind.BOW}:
+            return 2 * np.pi
+        radius = float(self._state.element.radius_at(deformation.chainage))
+        width = deformation.width / radius if radius > 0 else np.nan
+        return width if np.isfinite(width) else 2 * np.pi
+
+    # Mouse
+
+    def _place(self, position: QPointF) -> tuple[float, float]:
+        """Chainage and clock angle (0 … 2π) under a position in the canvas."""
+        at = self.plot.vb.mapSceneToView(position)
+        return at.x(), float(np.mod(np.deg2rad(at.y()), 2 * np.pi))
+
+    def _click(self, _: pg.PlotItem, position: QPointF) -> None:
+        if self._map is None:
+            return
+        at = self.plot.vb.mapSceneToView(position)
+        hit = [
+            d
+            for d in self._state.deformations
+            if any(_is_inside(box, at) for box in self._boxes(d))
+        ]
+        if hit:
+            smallest = min(hit, key=lambda d: d.length * self._angular_width(d))
+            self.deformation_clicked.emit(smallest.deformation_id)
+        elif self._map.cell(*self._place(position)) is not None:
+            self.spot_clicked.emit(*self._place(position))
+
+    def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
+        self.readout.setText(self._text_at(position) if plot and self._map else "")
+
+    def _text_at(self, position: QPointF) -> str:
+        chainage, clock = self._place(position)
+        cell = self._map.cell(chainage, clock)
+        if cell is None:
+            return ""
+        place = f"{chainage:.3f} m · {format_clock(clock)}"
+        n_points = int(self._map.n_points[cell])
+        if not n_points:
+            return f"{place} · not scanned"
+        value: Array = self._map.deviation_mm[cell]
+        side = "outward" if value > 0 else "inward"
+        size = format_measure(abs(float(value)), unit="mm")
+        return f"{place} · {size} {side} · {n_points} points"
+
+
+class ScaleStrip(QWidget):
+    """The colours of the deviation with their limits."""
+
+    BAR = 120
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._limit_mm = 10.0
+        self.setFixedHeight(3 * SPACING)
+        self.setMinimumWidth(self.BAR + 120)
+
+    def set_limit(self, limit_mm: float) -> None:
+        """Take other limits."""
+        self._limit_mm = limit_mm
+        self.update()
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """Draw "−10 ▇▇▇ +10 mm"."""
+        painter = QPainter(self)
+        painter.setPen(theme.colour("text"))
+        low, high = f"−{self._limit_mm:g}", f"+{self._limit_mm:g} mm"
+        metrics = painter.fontMetrics()
+        left = metrics.horizontalAdvance(low) + SPACING
+        middle = self.height() / 2
+        baseline = middle + metrics.ascent() / 2 - 1
+        painter.drawText(QPointF(0, baseline), low)
+        strip = np.ascontiguousarray(DEVIATION)
+        image = QImage(strip.data, len(strip), 1, 3 * len(strip), QImage.Format.Format_RGB888)
+        painter.drawImage(QRectF(left, middle - 6, self.BAR, 12), image)
+        painter.drawText(QPointF(left + self.BAR + SPACING, baseline), high)
+        painter.end()
+
+
+def _is_inside(box: QRectF, at: QPointF) -> bool:
+    if box.height() >= 360:
+        return box.contains(at)
+    x = (at.x() - box.center().x()) / (box.width() / 2)
+    y = (at.y() - box.center().y()) / (box.height() / 2)
+    return x * x + y * y <= 1
