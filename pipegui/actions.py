@@ -137,13 +137,16 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     ),
 }
 
+VIEW_OPTIONS = ("show_points", "show_axes", "show_ellipses", "show_surfaces", "show_labels", "fly")
+"""Actions that switch the field of `ViewOptions` with their name."""
+
 SPECS = tuple(spec for menu in MENUS.values() for spec in menu if spec is not None)
 
 
 class Actions:
     """The window's `QAction`s by name, in its menus."""
 
-    def __init__(self, window: QMainWindow, handlers: Mapping[str, Callable[..., None]]) -> None:
+    def __init__(self, window: QMainWindow, handlers: Mapping[str, Callable[..., object]]) -> None:
         self.menus: dict[str, QMenu] = {}
         self._actions: dict[str, QAction] = {}
         for name, specs in MENUS.items():

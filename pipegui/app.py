@@ -15,7 +15,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
 
     # Qt and VTK take their time: `--help` does without them.
-    from PySide6.QtCore import QSettings, Qt  # noqa: PLC0415
+    from PySide6.QtCore import QSettings  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
     from pipegui import theme  # noqa: PLC0415
@@ -36,7 +36,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ini = QSettings.Format.IniFormat
         stored = QSettings(f"{scratch}/layout.ini", ini) if is_shot else QSettings()
         window = MainWindow(make_parts(), Jobs(), stored)
-        window.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         window.show()
         if is_shot:
             from pipegui.screenshot import Screenshot  # noqa: PLC0415
@@ -45,7 +44,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         elif options.detect:
             window.jobs.scan_read.connect(lambda _: window.detect())
         window.open_files(options.files)
-        return app.exec()
+        code = app.exec()
+        window.close()
+        window.deleteLater()
+        return code
 
 
 def _parser() -> argparse.ArgumentParser:

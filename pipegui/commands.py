@@ -62,6 +62,11 @@ def activate_scan(document: Document, index: int) -> Document:
     return replace(document, view=view)
 
 
+def step_scan(document: Document) -> Document:
+    """Look at the next open scan."""
+    return activate_scan(document, (document.active + 1) % max(len(document.scans), 1))
+
+
 @step("Detect")
 def set_result(document: Document, cloud: PointCloud, result: Result) -> Document:
     """Take the result of a detection on `cloud`; keeps the selection, else shows the worst dent.

@@ -28,8 +28,9 @@ from pipecore.types import (
     Result,
     Verdict,
 )
+from pipegui.cuts import stack_name
 from pipegui.document import Scan, Selection
-from pipegui.view_state import PropertiesState, stack_name
+from pipegui.view_state import PropertiesState
 
 ARC_TOO_SHORT = "The scan sees {arc:.0f}° of the circumference: too little to carry this number."
 

@@ -1,6 +1,6 @@
 """The main window: signals of the parts become commands, states go back to the parts."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QToolTi
 from pipecore.errors import PipecoreError
 from pipecore.report.summary import summarise
 from pipecore.types import PointCloud, Result
-from pipegui import commands, describe, files, theme
-from pipegui.actions import Actions
+from pipegui import commands, describe, files, theme, wiring
+from pipegui.actions import VIEW_OPTIONS, Actions
 from pipegui.document import Document, Scan
 from pipegui.history import History
 from pipegui.jobs import Jobs
@@ -23,8 +23,6 @@ from pipegui.panels.status import StatusBar
 from pipegui.parts import Parts
 from pipegui.toolbar import ToolBar
 from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
-
-VIEW_OPTIONS = ("show_points", "show_axes", "show_ellipses", "show_surfaces", "show_labels", "fly")
 
 
 class MainWindow(QMainWindow):
@@ -50,7 +48,7 @@ class MainWindow(QMainWindow):
         self._state = ViewState()
         self.panels = Panels.make()
         self.menu_actions = MenuActions(self)
-        self.actions_ = Actions(self, self._handlers())
+        self.actions_ = Actions(self, wiring.handlers(self))
         self.tool_bar = ToolBar(self.actions_)
         self.addToolBar(self.tool_bar)
         self.status = StatusBar()
@@ -58,95 +56,11 @@ class MainWindow(QMainWindow):
         self.centre = QStackedWidget()
         arrange(self)
         self.menu_actions.list_recent()
-        self._connect_parts()
-        self._connect_jobs()
+        wiring.connect_panels(self)
+        wiring.connect_views(self)
+        wiring.connect_jobs(self)
         QApplication.styleHints().colorSchemeChanged.connect(self._change_scheme)
         self._apply(resolve(self.history.document), everything=True)
-
-    # Signals become commands
-
-    def _handlers(self) -> Mapping[str, Callable[..., None]]:
-        do, menu = self.do, self.menu_actions
-        handlers: dict[str, Callable[..., None]] = {
-            "open": menu.open,
-            "close_scan": lambda: do(commands.close_scan, self.document.active),
-            "load_settings": menu.load_settings,
-            "save_settings": menu.save_settings,
-            "quit": self.close,
-            "undo": self.history.undo,
-            "redo": self.history.redo,
-            "go_up": lambda: do(commands.select_parent),
-            "fit": self.parts.scene.fit,
-            "next_scan": lambda: do(
-                commands.activate_scan, (self.document.active + 1) % len(self.document.scans)
-            ),
-            "detect": self.detect,
-            "cancel": self.jobs.cancel,
-            "add_stack": self.panels.open_stack_editor,
-            "reset_settings": lambda: do(commands.reset_settings),
-            "next_deformation": lambda: do(commands.step_deformation, 1),
-            "previous_deformation": lambda: do(commands.step_deformation, -1),
-            "isolate": lambda: do(commands.isolate),
-            "show_all": lambda: do(commands.show_all),
-            "export_report": menu.export_report,
-            "export_deformations": lambda: menu.export_table("deformations"),
-            "export_elements": lambda: menu.export_table("elements"),
-            "export_profiles": lambda: menu.export_table("profiles"),
-            "export_picture": menu.export_picture,
-            "demo": menu.open_demo,
-            "shortcuts": menu.show_shortcuts,
-            "about": menu.show_about,
-        }
-        for name in ("top", "front", "right", "iso"):
-            handlers[f"view_{name}"] = lambda name=name: self.parts.scene.set_standard_view(name)
-        for name in VIEW_OPTIONS:
-            handlers[name] = lambda on, name=name: do(commands.set_view, **{name: on})
-        return handlers
-
-    def _connect_parts(self) -> None:
-        do, panels, parts = self.do, self.panels, self.parts
-        panels.welcome.open_requested.connect(self.menu_actions.open)
-        panels.welcome.demo_requested.connect(self.menu_actions.open_demo)
-        panels.tree.chosen.connect(self._choose_in_tree)
-        panels.tree.visibility_changed.connect(
-            lambda ids, hidden: do(commands.set_hidden, ids, hidden)
-        )
-        panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
-        panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
-        panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
-        panels.stacks.preset_chosen.connect(lambda p: do(commands.set_preset, p))
-        panels.stacks.added.connect(lambda d: do(commands.add_stack, d))
-        panels.stacks.edited.connect(lambda i, d: do(commands.edit_stack, i, d))
-        panels.stacks.removed.connect(lambda i: do(commands.remove_stack, i))
-        panels.stacks.shown.connect(lambda i: do(commands.show_stack, i))
-        if hasattr(parts.scene, "view_direction"):
-            panels.stacks.editor.view_direction = parts.scene.view_direction
-        parts.scene.picked.connect(lambda i: do(commands.select_point, i))
-        parts.scene.deformation_picked.connect(lambda i: do(commands.select_deformation, i))
-        parts.scene.hovered.connect(self._hover)
-        parts.radius_plot.profile_clicked.connect(
-            lambda stack, index: do(commands.select_profile, stack, index)
-        )
-        parts.radius_plot.stack_chosen.connect(lambda i: do(commands.show_plot_stack, i))
-        parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
-        parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
-        parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
-        self.tool_bar.colour_chosen.connect(lambda c: do(commands.set_colour, c))
-        self.tool_bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
-        self.status.cancel_requested.connect(self.jobs.cancel)
-
-    def _connect_jobs(self) -> None:
-        jobs, tell = self.jobs, self.panels.message.tell
-        jobs.started.connect(self.status.start)
-        jobs.progressed.connect(self.status.progress)
-        jobs.cancelling.connect(self.status.show_cancelling)
-        jobs.ended.connect(self.status.end)
-        jobs.busy_changed.connect(lambda _: self._update_actions())
-        jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))
-        jobs.failed.connect(lambda message, details: tell(message, "error", details))
-        jobs.scan_read.connect(self._take_scan)
-        jobs.detected.connect(self._take_result)
-        jobs.written.connect(lambda path: tell(f"Saved “{path}”."))
 
     @property
     def document(self) -> Document:
@@ -175,14 +89,16 @@ class MainWindow(QMainWindow):
         if self.document.scan is not None:
             self.jobs.detect(self.document.scan.cloud, self.document.settings)
 
-    def _take_scan(self, scan: Scan) -> None:
+    def take_scan(self, scan: Scan) -> None:
+        """Add a scan that was read."""
         self.panels.message.hide()
         self.do(commands.open_scan, scan)
         if scan.cloud.source is not None:
             files.remember(self.stored, scan.cloud.source)
             self.menu_actions.list_recent()
 
-    def _take_result(self, cloud: PointCloud, result: Result) -> None:
+    def take_result(self, cloud: PointCloud, result: Result) -> None:
+        """Show what was detected, and say it in a line."""
         self.do(commands.set_result, cloud, result)
         hint = "" if result.elements else ". Check the length unit and the smallest radius"
         seconds = sum(result.seconds.values())
@@ -190,7 +106,8 @@ class MainWindow(QMainWindow):
         severity = "info" if result.elements else "warning"
         self.panels.message.tell(f"{summarise(result)}{hint}.{took}", severity)
 
-    def _choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
+    def choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
+        """Select what was chosen in the tree, in another scan if it is there."""
         if scan_index != self.document.active:
             self.do(commands.activate_scan, scan_index)
         choose = {
@@ -203,7 +120,8 @@ class MainWindow(QMainWindow):
         elif kind is NodeKind.SCAN:
             self.do(commands.select, type(self.document.selection)())
 
-    def _hover(self, point_index: int) -> None:
+    def hover(self, point_index: int) -> None:
+        """Say what is under the cursor: coordinates below, name and deviation beside it."""
         scan = self.document.scan
         if scan is None or point_index < 0:
             self.status.cursor_position.clear()
@@ -223,7 +141,7 @@ class MainWindow(QMainWindow):
         for name, part in self._consumers().items():
             if everything or getattr(state, name) != getattr(before, name):
                 part(getattr(state, name))
-        self._update_actions()
+        self.update_actions()
 
     def _consumers(self) -> dict[str, Callable[[Any], None]]:
         panels, parts = self.panels, self.parts
@@ -255,7 +173,8 @@ class MainWindow(QMainWindow):
         title = describe.title(result, state.selection)
         self.panels.docks["Element"].setWindowTitle(title or "Element")
 
-    def _update_actions(self) -> None:
+    def update_actions(self) -> None:
+        """Enable the actions that make sense now."""
         document, busy = self.document, self.jobs.is_busy
         self.actions_.update(
             {

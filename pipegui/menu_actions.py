@@ -8,7 +8,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLabel, QMenu, QMessageBox
 
 import pipecore
-from pipecore.errors import PipecoreError
+from pipecore.errors import PipecoreError, WriteError
 from pipecore.progress import Progress
 from pipecore.resources import resource
 from pipecore.settings import Settings
@@ -92,7 +92,8 @@ class MenuActions:
         """Ask where to, and save what the 3D view shows."""
 
         def write(path: Path) -> None:
-            self._window.parts.scene.screenshot(path)
+            if not self._window.parts.scene.screenshot().save(str(path)):
+                raise WriteError("the folder cannot be written to.")
 
         self._save("Save picture", f"{self._stem()}.png", "Pictures (*.png)", write)
 

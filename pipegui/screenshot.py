@@ -27,13 +27,9 @@ class Screenshot(QObject):
     def _save(self) -> None:
         if not self._window.grab().save(str(self._path)):
             self._fail(f"The picture could not be written to {self._path}.")
-            return
-        self._end(0)
+        else:
+            self.ended.emit(0)
 
     def _fail(self, message: str, details: str = "") -> None:
         print(message, details, sep="\n", file=sys.stderr)
-        self._end(1)
-
-    def _end(self, code: int) -> None:
-        self._window.close()
-        self.ended.emit(code)
+        self.ended.emit(1)

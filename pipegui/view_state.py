@@ -25,7 +25,7 @@ from pipecore.types import (
     Result,
     Stack,
 )
-from pipegui import selecting
+from pipegui import cuts, selecting
 from pipegui.document import Document, ProfileKey, Scan, Selection, ViewOptions
 
 Array = NDArray[np.float64]
@@ -236,10 +236,10 @@ def resolve(document: Document) -> ViewState:
     profile, profile_xyz, shown = None, NO_POINTS, None
     if result is not None:
         if selection.profile is not None:
-            profile = _profile(result, selection.element_id, selection.profile)
+            profile = cuts.profile_at(result, selection.element_id, selection.profile)
             if profile is not None:
                 args = scan.cloud, result, selection.element_id, selection.profile
-                profile_xyz = _profile_xyz(*args)
+                profile_xyz = cuts.points_of_profile(*args)
         shown = selecting.shown_profile(result, selection)
     return ViewState(
         window=WindowState(scan, view, selection != Selection()),
@@ -256,7 +256,7 @@ def resolve(document: Document) -> ViewState:
         stacks=StacksState(
             document.settings.stacks,
             result.stacks if result else (),
-            _profiles_per_stack(result) if result else (),
+            cuts.count_profiles(result) if result else (),
             view.shown_stack,
         ),
         settings=document.settings,
@@ -274,15 +274,15 @@ def _element_states(
         return {}
     result = scan.result
     element = result.element(selection.element_id)
-    deformations = _deformations(result, element.element_id)
+    deformations = cuts.deformations_of(result, element.element_id)
     stack_id = selection.profile.stack_id if selection.profile else view.plot_stack
-    profile = _profile(result, element.element_id, shown) if shown else None
-    choices = _stack_choices(result, element.element_id)
+    profile = cuts.profile_at(result, element.element_id, shown) if shown else None
+    choices = cuts.stack_choices(result, element.element_id)
     if stack_id not in {choice[0] for choice in choices}:
         stack_id = choices[0][0] if choices else OWN_STACK
     radius_plot = RadiusPlotState(
         element=element,
-        profiles=_profiles(result, element.element_id),
+        profiles=cuts.profiles_of(result, element.element_id),
         stack_id=stack_id,
         stacks=choices,
         selected_index=shown.profile_index if shown and shown.stack_id == stack_id else None,
@@ -293,7 +293,7 @@ def _element_states(
         section = SectionState(element=element)
     else:
         section = _section(scan.cloud, result, element.element_id, shown)
-    chainage, clock, deviation, _ = _surface(scan.cloud, result, element.element_id)
+    chainage, clock, deviation, _ = cuts.surface_of(scan.cloud, result, element.element_id)
     deviation_map = MapState(
         element=element,
         chainage=chainage,
@@ -307,66 +307,11 @@ def _element_states(
     return {"radius_plot": radius_plot, "section": section, "map": deviation_map}
 
 
-# Cuts out of a result. Kept for the few elements last looked at, because equality
-# of the states stands on their identity; results themselves live in the history.
-
-
-@lru_cache(maxsize=8)
-def _profiles_per_stack(result: Result) -> tuple[int, ...]:
-    return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
-
-
-@lru_cache(maxsize=32)
-def _deformations(result: Result, element_id: int) -> tuple[Deformation, ...]:
-    return result.deformations_of(element_id)
-
-
-@lru_cache(maxsize=32)
-def _profiles(result: Result, element_id: int) -> Profiles:
-    return result.profiles.of_element(element_id)
-
-
-@lru_cache(maxsize=32)
-def _profile(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
-    rows = _profiles(result, element_id)
-    row = (rows.stack_id == key.stack_id) & (rows.profile_index == key.profile_index)
-    return rows[np.flatnonzero(row)[:1]] if row.any() else None
-
-
-@lru_cache(maxsize=32)
-def _stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
-    """Stacks with profiles of this element: its own first, then by number of profiles."""
-    ids, counts = np.unique(_profiles(result, element_id).stack_id, return_counts=True)
-    choices = [
-        (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
-    ]
-    return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
-
-
-def stack_name(result: Result, stack_id: int) -> str:
-    """What people call a stack."""
-    if stack_id == OWN_STACK:
-        return "Across the axis"
-    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
-    return stack.name if stack is not None and stack.name else f"Stack {stack_id}"
-
-
-@lru_cache(maxsize=4)
-def _surface(
-    cloud: PointCloud, result: Result, element_id: int
-) -> tuple[Array, Array, Array, NDArray[np.intp]]:
-    """Chainage, clock, deviation and index in the cloud of one element's points."""
-    index = np.flatnonzero(result.element_id == element_id)
-    axis = result.element(element_id).axis
-    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index].astype(np.float64))
-    return chainage, clock, result.deviation[index].astype(np.float64), index
-
-
 @lru_cache(maxsize=8)
 def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> SectionState:
     """The profile's points carried along the element's axis into the profile's plane."""
     element = result.element(element_id)
-    profile = _profile(result, element_id, key)
+    profile = cuts.profile_at(result, element_id, key)
     assert profile is not None
     chainage, centre = float(profile.chainage[0]), profile.centre[0]
     tangent, normal = element.axis.tangent(chainage), profile.normal[0]
@@ -381,9 +326,9 @@ def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey
         offset = offset - ((offset @ normal) / tilt)[..., None] * tangent
         return 1000 * np.stack([offset @ right, offset @ up], axis=-1)
 
-    siblings = _profiles(result, element_id)
+    siblings = cuts.profiles_of(result, element_id)
     siblings = siblings[siblings.stack_id == key.stack_id]
-    xyz = _profile_xyz(cloud, result, element_id, key)
+    xyz = cuts.points_of_profile(cloud, result, element_id, key)
 
     major = profile.major_direction[0]
     fitted = Ellipse(
@@ -408,31 +353,10 @@ def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey
         reference=reference,
         position=1 + int(np.flatnonzero(siblings.profile_index == key.profile_index)[0]),
         count=len(siblings),
-        stack_name=stack_name(result, key.stack_id),
+        stack_name=cuts.stack_name(result, key.stack_id),
         deformations=tuple(
             d
-            for d in _deformations(result, element_id)
+            for d in cuts.deformations_of(result, element_id)
             if d.chainage_start <= chainage <= d.chainage_end
         ),
     )
-
-
-@lru_cache(maxsize=8)
-def _profile_xyz(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> Array:
-    """Points of the element that lie in one profile, float64."""
-    profile = _profile(result, element_id, key)
-    assert profile is not None
-    chainages, _, _, index = _surface(cloud, result, element_id)
-    if key.stack_id == OWN_STACK:
-        siblings = _profiles(result, element_id)
-        siblings = siblings[siblings.stack_id == OWN_STACK]
-        # Neighbouring own profiles touch, so their spacing is their width.
-        width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
-        inside = np.abs(chainages - profile.chainage[0]) <= width / 2
-        return cloud.xyz[index[inside]].astype(np.float64)
-    stack = next(s for s in result.stacks if s.stack_id == key.stack_id)
-    xyz = cloud.xyz[index]
-    inside = stack.profile_index(xyz) == key.profile_index
-    # A stack's plane may cut a bend twice: only the branch of this profile counts.
-    near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
-    return xyz[inside & near].astype(np.float64)

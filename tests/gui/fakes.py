@@ -3,11 +3,11 @@
 They keep the states they were given and have the real views' signals.
 """
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PySide6.QtCore import Signal
+from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
 from pipegui.parts import Parts
@@ -44,8 +44,8 @@ class FakeScene(FakeView):
     def view_direction(self) -> np.ndarray:
         return np.array([0.0, 0.6, -0.8])
 
-    def screenshot(self, path: Path) -> None:
-        self.grab().save(str(path))
+    def screenshot(self) -> QImage:
+        return self.grab().toImage()
 
 
 class FakeRadiusPlot(FakeView):

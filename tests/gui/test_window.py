@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QMimeData, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
 from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog, QPushButton
 
 from pipecore.errors import CancelledError, ReadError
@@ -391,6 +391,13 @@ def test_that_a_table_that_cannot_be_written_is_told(detected, tmp_path, monkeyp
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: (str(target), ""))
     detected.actions_["export_deformations"].trigger()
     assert "was not saved" in detected.panels.message.text.text()
+
+
+def test_that_a_picture_of_the_3d_view_is_saved(detected, tmp_path, monkeypatch):
+    target = tmp_path / "view.png"
+    monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *a: (str(target), ""))
+    detected.actions_["export_picture"].trigger()
+    assert QImage(str(target)).width() == detected.parts.scene.width()
 
 
 def test_that_the_report_folder_is_written_beside_the_window_and_never_over_another(

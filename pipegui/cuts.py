@@ -1,0 +1,90 @@
+"""Cuts out of a result: the profiles, points and deformations of one element.
+
+Made once and kept for the few elements last looked at, because equality of view states
+stands on their identity. Results themselves live in the history. Qt-free.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.geometry import Array
+from pipecore.types import OWN_STACK, Deformation, PointCloud, Profiles, Result
+from pipegui.document import ProfileKey
+
+
+@lru_cache(maxsize=8)
+def count_profiles(result: Result) -> tuple[int, ...]:
+    """Return the number of profiles with an accepted ellipse, per stack."""
+    return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
+
+
+@lru_cache(maxsize=32)
+def deformations_of(result: Result, element_id: int) -> tuple[Deformation, ...]:
+    """Return the deformations of one element."""
+    return result.deformations_of(element_id)
+
+
+@lru_cache(maxsize=32)
+def profiles_of(result: Result, element_id: int) -> Profiles:
+    """Return the profiles of one element, of every stack."""
+    return result.profiles.of_element(element_id)
+
+
+@lru_cache(maxsize=32)
+def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
+    """Return one profile as a table of one row, None if it is not there."""
+    rows = profiles_of(result, element_id)
+    row = (rows.stack_id == key.stack_id) & (rows.profile_index == key.profile_index)
+    return rows[np.flatnonzero(row)[:1]] if row.any() else None
+
+
+@lru_cache(maxsize=32)
+def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
+    """Stacks with profiles of this element: its own first, then by number of profiles."""
+    ids, counts = np.unique(profiles_of(result, element_id).stack_id, return_counts=True)
+    choices = [
+        (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
+    ]
+    return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
+
+
+def stack_name(result: Result, stack_id: int) -> str:
+    """What people call a stack."""
+    if stack_id == OWN_STACK:
+        return "Across the axis"
+    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
+    return stack.name if stack is not None and stack.name else f"Stack {stack_id}"
+
+
+@lru_cache(maxsize=4)
+def surface_of(
+    cloud: PointCloud, result: Result, element_id: int
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Chainage, clock, deviation and index in the cloud of one element's points."""
+    index = np.flatnonzero(result.element_id == element_id)
+    axis = result.element(element_id).axis
+    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index].astype(np.float64))
+    return chainage, clock, result.deviation[index].astype(np.float64), index
+
+
+@lru_cache(maxsize=8)
+def points_of_profile(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> Array:
+    """Points of the element that lie in one profile, float64."""
+    profile = profile_at(result, element_id, key)
+    assert profile is not None
+    chainages, _, _, index = surface_of(cloud, result, element_id)
+    if key.stack_id == OWN_STACK:
+        siblings = profiles_of(result, element_id)
+        siblings = siblings[siblings.stack_id == OWN_STACK]
+        # Neighbouring own profiles touch, so their spacing is their width.
+        width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
+        inside = np.abs(chainages - profile.chainage[0]) <= width / 2
+        return cloud.xyz[index[inside]].astype(np.float64)
+    stack = next(s for s in result.stacks if s.stack_id == key.stack_id)
+    xyz = cloud.xyz[index]
+    inside = stack.profile_index(xyz) == key.profile_index
+    # A stack's plane may cut a bend twice: only the branch of this profile counts.
+    near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
+    return xyz[inside & near].astype(np.float64)

@@ -1,0 +1,99 @@
+"""Which signal of the window becomes which command."""
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from pipegui import commands
+from pipegui.actions import VIEW_OPTIONS
+
+if TYPE_CHECKING:
+    from pipegui.main_window import MainWindow
+
+
+def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
+    """Return what each action of the menus does, by its name."""
+    do, menu, scene = window.do, window.menu_actions, window.parts.scene
+    found: dict[str, Callable[..., object]] = {
+        "open": menu.open,
+        "close_scan": lambda: do(commands.close_scan, window.document.active),
+        "load_settings": menu.load_settings,
+        "save_settings": menu.save_settings,
+        "quit": window.close,
+        "undo": window.history.undo,
+        "redo": window.history.redo,
+        "go_up": lambda: do(commands.select_parent),
+        "fit": scene.fit,
+        "next_scan": lambda: do(commands.step_scan),
+        "detect": window.detect,
+        "cancel": window.jobs.cancel,
+        "add_stack": window.panels.open_stack_editor,
+        "reset_settings": lambda: do(commands.reset_settings),
+        "next_deformation": lambda: do(commands.step_deformation, 1),
+        "previous_deformation": lambda: do(commands.step_deformation, -1),
+        "isolate": lambda: do(commands.isolate),
+        "show_all": lambda: do(commands.show_all),
+        "export_report": menu.export_report,
+        "export_picture": menu.export_picture,
+        "demo": menu.open_demo,
+        "shortcuts": menu.show_shortcuts,
+        "about": menu.show_about,
+    }
+    for table in ("deformations", "elements", "profiles"):
+        found[f"export_{table}"] = lambda table=table: menu.export_table(table)
+    for name in ("top", "front", "right", "iso"):
+        found[f"view_{name}"] = lambda name=name: scene.set_standard_view(name)
+    for name in VIEW_OPTIONS:
+        found[name] = lambda on, name=name: do(commands.set_view, **{name: on})
+    return found
+
+
+def connect_panels(window: "MainWindow") -> None:
+    """Connect the panels and the tool bar."""
+    do, panels = window.do, window.panels
+    panels.welcome.open_requested.connect(window.menu_actions.open)
+    panels.welcome.demo_requested.connect(window.menu_actions.open_demo)
+    panels.tree.chosen.connect(window.choose_in_tree)
+    panels.tree.visibility_changed.connect(lambda ids, hide: do(commands.set_hidden, ids, hide))
+    panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
+    panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
+    panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
+    panels.stacks.preset_chosen.connect(lambda preset: do(commands.set_preset, preset))
+    panels.stacks.added.connect(lambda stack: do(commands.add_stack, stack))
+    panels.stacks.edited.connect(lambda i, stack: do(commands.edit_stack, i, stack))
+    panels.stacks.removed.connect(lambda i: do(commands.remove_stack, i))
+    panels.stacks.shown.connect(lambda i: do(commands.show_stack, i))
+    panels.stacks.editor.view_direction = window.parts.scene.view_direction
+    bar = window.tool_bar
+    bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
+    bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
+
+
+def connect_views(window: "MainWindow") -> None:
+    """Connect the 3D view and the plots."""
+    do, parts = window.do, window.parts
+    parts.scene.picked.connect(lambda i: do(commands.select_point, i))
+    parts.scene.deformation_picked.connect(lambda i: do(commands.select_deformation, i))
+    parts.scene.hovered.connect(window.hover)
+    parts.radius_plot.profile_clicked.connect(
+        lambda stack, index: do(commands.select_profile, stack, index)
+    )
+    parts.radius_plot.stack_chosen.connect(lambda i: do(commands.show_plot_stack, i))
+    parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
+    parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
+    parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
+
+
+def connect_jobs(window: "MainWindow") -> None:
+    """Connect the long work to status bar, message bar and document."""
+    jobs, status, tell = window.jobs, window.status, window.panels.message.tell
+    status.cancel_requested.connect(jobs.cancel)
+    jobs.started.connect(status.start)
+    jobs.progressed.connect(status.progress)
+    jobs.cancelling.connect(status.show_cancelling)
+    jobs.ended.connect(status.end)
+    jobs.busy_changed.connect(lambda _: window.update_actions())
+    jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))
+    jobs.failed.connect(lambda message, details: tell(message, "error", details))
+    jobs.scan_read.connect(window.take_scan)
+    jobs.detected.connect(window.take_result)
+    jobs.written.connect(lambda path: tell(f"Saved “{path}”."))
