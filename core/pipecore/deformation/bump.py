@@ -10,6 +10,7 @@ nominal extent has just that extent.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from pipecore.geometry import Array
@@ -40,7 +41,8 @@ class Bump:
 
     `height` is signed (outward positive); `curvature_along` and `curvature_around` are
     the magnitudes of the second derivatives at the peak of the cosine (1/metres). `misfit`
-    is the root mean square of the residuals under it in units of their noise.
+    is the root mean square of the residuals under it in units of their noise, `noise` the
+    standard deviation of the height of a bump whose place and form are known.
     """
 
     along: float
@@ -52,6 +54,8 @@ class Bump:
     curvature_along: float
     curvature_around: float
     misfit: float
+    noise: float
+    n_points: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +105,7 @@ def fit_bump(
         if min(length, width) < MIN_EXTENT * diameter or max(length, width) > MAX_EXTENT * diameter:
             return None
     best, doubt = plain, 0.0
-    if abs(first[0]) > CLEAR * _height_sd(data, length, width):
+    if abs(first[0]) > CLEAR * _height_sd((data[0], data[1], data[3]), length, width):
         free = _fit(data, np.append(first, 0.0), diameter, contour_sd)
         gain = plain.chi2 - free.chi2 - 2  # by AIC: one parameter more has to be worth it
         if gain > 0:
@@ -112,6 +116,7 @@ def fit_bump(
     height, along_peak, around_peak = best.parameters[:3]
     length, width = np.exp(best.parameters[3:5])
     misfit = _core_misfit(data, best)
+    inside = np.hypot(2 * (along - along_peak) / length, 2 * (around - around_peak) / width)
     # Curvatures from the plain cosine: exponents make them zero or infinite at the peak.
     second = 2 * np.pi**2 * abs(plain.parameters[0]) / np.exp(2 * plain.parameters[3:5])
     return Bump(
@@ -124,6 +129,10 @@ def fit_bump(
         curvature_along=float(second[0]),
         curvature_around=float(second[1]),
         misfit=misfit,
+        noise=_height_sd(
+            (along - along_peak, around - around_peak, noise * inflation), length, width
+        ),
+        n_points=int(np.count_nonzero(inside < 1)),
     )
 
 
@@ -148,7 +157,7 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
 
 def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:
     """Noise of the height of a bump whose place and size are known."""
-    along, around, _, noise = data
+    along, around, noise = data
     b = bump_shape(np.hypot(2 * along / length, 2 * around / width))
     return float(1.0 / np.sqrt(max(np.sum((b / noise) ** 2), 1e-12)))
 
@@ -170,7 +179,7 @@ def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: flo
             p[5] / max(contour_sd, 1e-5),
             np.log(q) / FORM_PRIOR,
         ]
-        return np.asarray(np.append((deviation - model) / noise, beliefs))
+        return np.concatenate([(deviation - model) / noise, np.asarray(beliefs)])
 
     scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
     answer = least_squares(
@@ -195,9 +204,9 @@ def _thin(
         return along, around, deviation, noise
     mesh = 64
 
-    def bin_of(x: Array) -> Array:
-        low, high = x.min(), x.max()
-        return np.minimum((x - low) / max(high - low, 1e-12) * mesh, mesh - 1).astype(np.intp)
+    def bin_of(x: Array) -> NDArray[np.intp]:
+        share = (x - x.min()) / max(float(np.ptp(x)), 1e-12)
+        return np.asarray(np.minimum(share * mesh, mesh - 1), dtype=np.intp)
 
     index = bin_of(along) * mesh + bin_of(around)
     weight = 1.0 / noise**2

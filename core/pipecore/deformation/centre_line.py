@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.deformation.reference import Contour
+from pipecore.deformation.reference import Contour, inner_rows
 from pipecore.geometry import Array
 
 KINK_ADVANTAGE = 20.0
@@ -32,15 +32,16 @@ class CentreLine:
 
 def measure_centre_line(contour: Contour) -> CentreLine:
     """Measure a contour fitted with a constant radius against the chord of its ends."""
-    s = contour.grid.chainages
-    offset = contour.terms[:, 1:3]
+    inner = inner_rows(contour.grid)
+    s = contour.grid.chainages[inner]
+    offset = contour.terms[inner, 1:3]
     deviation = offset - _chord(s, offset)
     distance = np.hypot(deviation[:, 0], deviation[:, 1])
     peak = int(np.argmax(distance))
     side = deviation[peak] / max(distance[peak], 1e-12)
     # The chord's ends are as uncertain as the peak: add their shares.
-    share = s[peak] / contour.grid.length
-    covariance = contour.term_covariance[:, 1:3, 1:3]
+    share = (s[peak] - s[0]) / (s[-1] - s[0])
+    covariance = contour.term_covariance[inner, 1:3, 1:3]
     variance = [float(side @ covariance[i] @ side) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     return CentreLine(

@@ -12,9 +12,9 @@ from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, ova
 from pipecore.deformation.patches import Patch, find_patches
 from pipecore.deformation.reference import (
     KNOT_DIAMETERS,
-    OVAL_KNOT_DIAMETERS,
     Contour,
     fit_contour,
+    oval_knot_diameters,
     usable_arc,
 )
 from pipecore.deformation.strain import dent_strain
@@ -59,7 +59,7 @@ class DeformationFinding:
     straightness: float = np.nan
 
 
-def find_deformations(  # noqa: PLR0917  (the pipeline's call)
+def find_deformations(
     element: Element,
     xyz: Array,
     normals: Array,
@@ -104,8 +104,9 @@ def find_deformations(  # noqa: PLR0917  (the pipeline's call)
     min_ovality = settings.min_ovality_pct / 100
     stretches = oval_stretches(contour, min_ovality) if n_terms == 5 else []
     if stretches:
-        patches, contour = search(OVAL_KNOT_DIAMETERS)
+        patches, contour = search(oval_knot_diameters(surface.grid))
         stretches = oval_stretches(contour, min_ovality)
+        patches = [p for p in patches if not _is_of_ovality(p, stretches, surface.grid)]
 
     deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
     least = settings.min_depth_mm / 1000
@@ -195,6 +196,17 @@ def _as_deformation(
         strain=strain,
         n_points=int(np.count_nonzero(inside)),
         significance=abs(patch.z),
+    )
+
+
+def _is_of_ovality(patch: Patch, stretches: list[OvalStretch], grid: Grid) -> bool:
+    """Whether a bump is what a contour could not follow at the ends of an oval stretch."""
+    diameter = 2 * grid.radius
+    return any(
+        oval.first * grid.row_size - diameter < patch.chainage
+        and patch.chainage < oval.last * grid.row_size + diameter
+        and abs(patch.bump.height) < oval.ovality * grid.radius / 2
+        for oval in stretches
     )
 
 

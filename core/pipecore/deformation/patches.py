@@ -21,6 +21,12 @@ MASKED_FROM = 0.7
 
 N_ROUNDS = 2
 
+MIN_POINTS = 8
+"""A bump of six parameters needs more points than that."""
+
+RETURN = 0.4
+"""Beyond a bump, the surface is back if it is closer to the contour than this share of it."""
+
 MAX_MISFIT = 1.8
 """A bulge whose points lie further from its fit (in units of noise) is two surfaces."""
 
@@ -127,17 +133,15 @@ def _measure(
         return None
     chainage = seen.chainage + bump.along / scale
     clock = float(np.mod(seen.clock + bump.around / radius, 2 * np.pi))
-    # How far the height stands out of the noise, its shape taken as given.
-    known = _known_shape_sd(cells, chainage, clock, bump) * seen.inflation
-    z = bump.height / float(np.hypot(known, contour_sd))
-    return Patch(chainage, clock, radius, bump, z, _is_enclosed(cells, chainage, clock, bump))
-
-
-def _known_shape_sd(cells: DeviationMap, chainage: float, clock: float, bump: Bump) -> float:
-    u, v = _shares(cells.grid, chainage, clock, bump.length, bump.width)
-    bell = np.cos(np.pi / 2 * np.minimum(np.hypot(u, v), 1.0)) ** 2
-    precision = np.sum(bell**2 * cells.count / cells.noise**2)
-    return float(1.0 / np.sqrt(max(precision, 1e-12)))
+    z = bump.height / float(np.hypot(bump.noise, contour_sd))
+    return Patch(
+        chainage,
+        clock,
+        radius,
+        bump,
+        z,
+        _is_enclosed(cells, cells.deviation - contour.height, chainage, clock, bump),
+    )
 
 
 def _shares(
@@ -166,19 +170,40 @@ def _closed_sides(
     return sum(int(np.count_nonzero(covered & side) > 0.5 * expected) for side in sides)
 
 
-def _is_enclosed(cells: DeviationMap, chainage: float, clock: float, bump: Bump) -> bool:
-    """Whether a bump is seen at its peak and all around it.
+def _returns(
+    cells: DeviationMap, deviation: Array, chainage: float, clock: float, bump: Bump
+) -> int:
+    """On how many of its four sides the surface is back at the contour beyond a bump."""
+    u, v = _shares(cells.grid, chainage, clock, bump.length, bump.width)
+    distance = np.hypot(u, v)
+    ring = (distance > 1.0) & (distance < 1.5) & (cells.count > 0)
+    n_back = 0
+    for side in (u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)):
+        there = ring & side
+        weight = cells.count[there] / cells.noise[there] ** 2
+        if weight.sum() > 0:
+            mean = float(np.average(deviation[there], weights=weight))
+            least = 2.5 / np.sqrt(weight.sum())
+            n_back += abs(mean) < max(RETURN * abs(bump.height), least)
+    return n_back
+
+
+def _is_enclosed(
+    cells: DeviationMap, deviation: Array, chainage: float, clock: float, bump: Bump
+) -> bool:
+    """Whether a bump is seen at its peak and the surface comes back to the contour around it.
 
     A dent may be cut off on one side by the edge of what was scanned. A bulge may not,
     nor have another surface near: things that touch a pipe look like that.
     """
-    if not 0 < chainage < cells.grid.length:
+    if not 0 < chainage < cells.grid.length or bump.n_points < MIN_POINTS:
         return False
-    n_closed = _closed_sides(cells, chainage, clock, bump.length, bump.width)
     distance = np.hypot(*_shares(cells.grid, chainage, clock, bump.length, bump.width))
     centre, inside = distance < 0.5, distance < 1.1
     if np.count_nonzero(cells.covered & centre) <= 0.6 * np.count_nonzero(centre):
         return False
+    n_closed = _closed_sides(cells, chainage, clock, bump.length, bump.width)
+    n_closed = min(n_closed, _returns(cells, deviation, chainage, clock, bump))
     if bump.height < 0:
         return n_closed >= 3
     disputed = np.count_nonzero(dilate(cells.disputed) & inside)

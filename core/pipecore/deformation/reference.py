@@ -19,12 +19,17 @@ from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
 KNOT_DIAMETERS = 2.0
-OVAL_KNOT_DIAMETERS = 0.75
-"""Knots along elements that are oval somewhere, as ovality may set in within a diameter."""
+OVAL_KNOTS = 0.15
+OVAL_KNOT_DIAMETERS = (0.35, 0.75)
+"""Knots along elements that are oval somewhere, as ovality may set in at once: metres, and
+the diameters that they are kept between."""
 
 MAX_INTERVALS = 60
 FLOOR = 2e-4
 """Cell means are not trusted below 0.2 mm, however many points they have."""
+
+END_MARGIN = 0.3
+"""Radii at either end that the contour is not fitted to: hubs and fillets begin there."""
 
 LEVEL_PRIOR, WALK_PRIOR = 0.1, 0.02
 """How far a coefficient lies from zero, and changes over two diameters: shares of the radius."""
@@ -84,6 +89,11 @@ def harmonics(clock: Array, n_terms: int) -> Array:
     return np.stack([*columns, np.sin(2 * clock)][:n_terms], axis=1)
 
 
+def oval_knot_diameters(grid: Grid) -> float:
+    """Distance between knots for an oval element, in diameters."""
+    return float(np.clip(OVAL_KNOTS / (2 * grid.radius), *OVAL_KNOT_DIAMETERS))
+
+
 def spline_basis(grid: Grid, knot_diameters: float) -> Array:
     """Cubic splines with equal knots at the rows of a grid, shape (rows, splines)."""
     wanted = grid.length / (2 * grid.radius * knot_diameters)
@@ -119,6 +129,7 @@ def fit_contour(
     phi = harmonics(grid.clocks, n_terms)
     prior = _prior_precision(grid, n_splines, n_terms, knot_diameters, constant_radius)
     used = np.isfinite(variance) & np.isfinite(height)
+    used &= inner_rows(grid)[:, None]
     y = np.where(used, height, 0.0)
     base = np.where(used, 1.0 / (np.where(used, variance, 1.0) + FLOOR**2), 0.0)
 
@@ -161,6 +172,12 @@ def _prior_precision(
         precision[:, k, :, k] = steps.T @ steps / (walk * freedom) ** 2
         precision[:, k, :, k] += np.eye(n_splines) / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
     return precision
+
+
+def inner_rows(grid: Grid) -> Flags:
+    """Rows away from the ends, or all of a short element."""
+    margin = END_MARGIN * grid.radius if grid.length > 2 * grid.radius else 0.0
+    return (grid.chainages >= margin) & (grid.chainages <= grid.length - margin)
 
 
 def usable_arc(grid: Grid, covered: Flags) -> float:
