@@ -1,8 +1,6 @@
 """The nonlinear least-squares ellipse: true distances, a covariance, and a robust variant.
 
-The curve is c + S·(cos t, sin t) with a symmetric S. Its five parameters, the centre, the
-mean semi-axis and the two components of half the difference of the semi-axes, have no
-singularity at the circle, where an axis ratio and an angle would have one.
+Its five parameters are those of `pipecore.ellipses.distances`, which know no singularity.
 """
 
 from collections.abc import Callable
@@ -15,13 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares
 
 from pipecore.ellipses.direct import fit_direct_ellipses
+from pipecore.ellipses.distances import (
+    N_PARAMETERS,
+    canonical,
+    orthogonal_distances,
+    radial_distances,
+    to_parameters,
+)
 
 Array = NDArray[np.float64]
 Model = Callable[[Array, Array], tuple[Array, Array]]
 
-N_PARAMETERS = 5
 SAMPLE_SIZE, N_SAMPLES = 6, 300
 """Random samples of the robust fit: with 40 % outliers, 14 of 300 are clean on average."""
+N_JUDGES = 500
+"""About as many points judge the samples."""
 TUKEY_REACH = 4.685
 """In standard deviations: 95 % as efficient as least squares where there are no outliers."""
 MAX_CONDITION = 1e8
@@ -171,29 +177,14 @@ def fit_nonlinear_ellipse(
     if np.linalg.svd(scaled, compute_uv=False)[1] < 1e-9 * np.sqrt(len(xy)):
         return NoFit("The points lie on a straight line.")
 
-    model = _orthogonal if distance is Distance.ORTHOGONAL else _radial
-    if start is not None:
-        first = _parameters((start.centre - middle) / scale, start.semi_major / scale,
-                            start.semi_minor / scale, start.angle)  # fmt: skip
-    else:
-        first = _best_of_samples(scaled) if robust else _direct(scaled)
+    first = _first(scaled, robust) if start is None else _start(start, middle, scale)
     if first is None:
         return NoFit("No ellipse passes near the points.")
-    fit = _reweighted(model, scaled, first) if robust else _least_squares(model, scaled, first)
+    model = orthogonal_distances if distance is Distance.ORTHOGONAL else radial_distances
+    fit = (_reweighted if robust else _least_squares)(model, scaled, first)
     if fit is None:
-        return NoFit("The fit does not settle: the points do not tell an ellipse from a parabola.")
-    result = _scaled_back(fit, middle, scale)
-    flattening = 1 - result.semi_minor / result.semi_major
-    if flattening > MAX_FLATTENING or result.semi_major > MAX_REACH * scale:
-        return NoFit("The points do not tell an ellipse from a line or a parabola.")
-    if fit.condition > MAX_CONDITION:
-        return NoFit("The points do not determine all five parameters of an ellipse.")
-    if result.semi_minor_sd > max_sd_share * result.semi_minor:
-        share = 100 * result.semi_minor_sd / result.semi_minor
-        return NoFit(
-            f"The arc is too short for a free ellipse: its semi-minor axis is known to ±{share:.0f} % only."
-        )
-    return result
+        return NoFit("The points do not tell an ellipse from a parabola.")
+    return _judge(fit, middle, scale, max_sd_share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,31 +199,52 @@ class _Fit:
     condition: float
 
 
-def _scaled_back(fit: _Fit, middle: Array, scale: float) -> FittedEllipse:
+def _judge(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> FittedEllipse | NoFit:
+    """The fit in the points' own units, if they determine it."""
     x, y, mean, cos_part, sin_part = scale * fit.parameters
     half_difference = float(np.hypot(cos_part, sin_part))
-    axes = sorted((abs(mean - half_difference), abs(mean + half_difference)))
-    return FittedEllipse(
+    ellipse = FittedEllipse(
         centre=middle + np.array([x, y]),
-        semi_major=float(axes[1]),
-        semi_minor=float(axes[0]),
+        semi_major=float(mean + half_difference),
+        semi_minor=float(mean - half_difference),
         angle=float(0.5 * np.arctan2(sin_part, cos_part)),
         covariance=scale**2 * fit.covariance,
         sigma=scale * fit.sigma,
         rss=scale**2 * fit.rss,
         weights=fit.weights,
     )
+    if (
+        ellipse.semi_minor < (1 - MAX_FLATTENING) * ellipse.semi_major
+        or ellipse.semi_major > MAX_REACH * scale
+    ):
+        return NoFit("The points do not tell an ellipse from a line or a parabola.")
+    if fit.condition > MAX_CONDITION:
+        return NoFit("The points do not determine all five parameters of an ellipse.")
+    if ellipse.semi_minor_sd > max_sd_share * ellipse.semi_minor:
+        share = 100 * ellipse.semi_minor_sd / ellipse.semi_minor
+        return NoFit(
+            "The arc is too short for a free ellipse: "
+            f"its semi-minor axis would be known to ±{share:.0f} % only."
+        )
+    return ellipse
 
 
-def _parameters(centre: Array, semi_major: float, semi_minor: float, angle: float) -> Array:
-    mean, half_difference = 0.5 * (semi_major + semi_minor), 0.5 * (semi_major - semi_minor)
-    cos_part, sin_part = half_difference * np.cos(2 * angle), half_difference * np.sin(2 * angle)
-    return np.array([*centre, mean, cos_part, sin_part])
+def _start(ellipse: PlaneEllipse, middle: Array, scale: float) -> Array:
+    return to_parameters(
+        (ellipse.centre - middle) / scale,
+        ellipse.semi_major / scale,
+        ellipse.semi_minor / scale,
+        ellipse.angle,
+    )
+
+
+def _first(points: Array, robust: bool) -> Array | None:
+    return _best_of_samples(points) if robust else _direct(points)
 
 
 def _direct(points: Array) -> Array | None:
     fit = fit_direct_ellipses(points, np.array([0, len(points)]))
-    first = _parameters(fit.centre[0], fit.semi_major[0], fit.semi_minor[0], fit.angle[0])
+    first = to_parameters(fit.centre[0], fit.semi_major[0], fit.semi_minor[0], fit.angle[0])
     return first if np.isfinite(first).all() else None
 
 
@@ -245,18 +257,33 @@ def _best_of_samples(points: Array) -> Array | None:
     starts = np.arange(0, (N_SAMPLES + 1) * SAMPLE_SIZE, SAMPLE_SIZE)
     fits = fit_direct_ellipses(ordered[rows].reshape(-1, 2), starts)
     table = np.column_stack([fits.centre, fits.semi_major, fits.semi_minor, fits.angle])
-    candidates = [_parameters(row[:2], *row[2:]) for row in table[np.isfinite(table).all(axis=1)]]
-    whole = _direct(points)
-    candidates += [] if whole is None else [whole]
-    medians = [float(np.median(np.abs(_radial(points, c)[0]))) for c in candidates]
-    return candidates[int(np.argmin(medians))] if candidates else None
+    table = table[np.isfinite(table).all(axis=1)]
+    if len(table) == 0:
+        return _direct(points)
+    judges = ordered[:: max(1, len(points) // N_JUDGES)]
+    x, y = (judges[:, None, i] - table[:, i] for i in (0, 1))
+    cos, sin = np.cos(table[:, 4]), np.sin(table[:, 4])
+    stretch = np.hypot((cos * x + sin * y) / table[:, 2], (cos * y - sin * x) / table[:, 3])
+    off = np.abs(np.hypot(x, y) * (1 - 1 / np.maximum(stretch, 1e-9)))
+    best = table[np.argmin(np.median(off, axis=0))]
+    return to_parameters(best[:2], *best[2:])
 
 
-def _least_squares(
-    model: Model, points: Array, first: Array, weights: Array | None = None
-) -> _Fit | None:
-    """Levenberg-Marquardt; None if it does not converge."""
-    weights = np.ones(len(points)) if weights is None else weights
+def _least_squares(model: Model, points: Array, first: Array) -> _Fit | None:
+    """Fit with equal weights; None if it does not converge."""
+    weights = np.ones(len(points))
+    parameters, rss = _descend(model, points, first, weights, max_evaluations=100)
+    if parameters is None:
+        return None
+    variance = rss / (len(points) - N_PARAMETERS)
+    inverse, condition = _inverse_normal(model(points, parameters)[1])
+    return _Fit(parameters, variance * inverse, np.sqrt(variance), rss, weights, condition)
+
+
+def _descend(
+    model: Model, points: Array, first: Array, weights: Array, max_evaluations: int
+) -> tuple[Array | None, float]:
+    """Levenberg-Marquardt: parameters, None if it does not converge, and the sum of squares."""
     root = np.sqrt(weights)
 
     def residuals(parameters: Array) -> Array:
@@ -266,56 +293,50 @@ def _least_squares(
         return root[:, None] * model(points, parameters)[1]
 
     solution = least_squares(
-        residuals, first, jacobian, method="lm", xtol=1e-9, ftol=1e-12, max_nfev=100
+        residuals, first, jacobian, method="lm", xtol=1e-9, ftol=1e-12, max_nfev=max_evaluations
     )
-    if solution.status <= 0 or not np.isfinite(solution.x).all():
-        return None
-    singular, rotation = np.linalg.svd(solution.jac, full_matrices=False)[1:]
-    if not singular[-1] > 0:
-        return None
-    rss = 2.0 * float(solution.cost)
-    variance = rss / (len(points) - N_PARAMETERS)
-    covariance = variance * (rotation.T / singular**2) @ rotation
-    condition = float(singular[0] / singular[-1])
-    return _Fit(solution.x, covariance, np.sqrt(variance), rss, weights, condition)
+    is_settled = solution.status > 0 and np.isfinite(solution.x).all()
+    return canonical(solution.x) if is_settled else None, 2.0 * float(solution.cost)
+
+
+def _inverse_normal(jacobian: Array) -> tuple[Array, float]:
+    """(JᵀJ)⁻¹ and the condition number of J, inf where it is singular."""
+    singular, rotation = np.linalg.svd(jacobian, full_matrices=False)[1:]
+    if not singular[-1] > 1e-15 * singular[0]:
+        return np.full((N_PARAMETERS, N_PARAMETERS), np.inf), np.inf
+    return (rotation.T / singular**2) @ rotation, float(singular[0] / singular[-1])
 
 
 def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
     """Iteratively reweighted fit with Tukey's biweight and a covariance after Huber."""
-    parameters, fit = first, None
+    parameters = first
     distances = model(points, parameters)[0]
     sigma = _spread(distances)
     for _ in range(30):
         weights = _tukey(distances / (TUKEY_REACH * sigma))
         if (weights > 0).sum() <= N_PARAMETERS:
             return None
-        fit = _least_squares(model, points, parameters, weights)
-        if fit is None:
+        found, _ = _descend(model, points, parameters, weights, max_evaluations=100)
+        if found is None:
             return None
-        moved = float(np.abs(fit.parameters - parameters).max())
-        parameters = fit.parameters
+        moved = float(np.abs(found - parameters).max())
+        parameters = found
         distances = model(points, parameters)[0]
         # It only narrows, so that the iteration ends.
-        sigma = min(sigma, _spread(distances))
-        if moved < 1e-9:
+        sigma = min(sigma, _spread(distances[weights > 0]))
+        if moved < 1e-7:
             break
-    assert fit is not None
     q = distances / (TUKEY_REACH * sigma)
     weights = _tukey(q)
     near = weights > 0
     n_near = int(near.sum())
-    slope = np.where(near, (1 - q**2) * (1 - 5 * q**2), 0.0).sum() / n_near
-    if n_near <= N_PARAMETERS or slope <= 0:
+    slope = float(((1 - q**2) * (1 - 5 * q**2))[near].mean()) if n_near > N_PARAMETERS else 0.0
+    if slope <= 0:
         return None
-    variance = (weights * distances**2 * weights).sum() / (n_near - N_PARAMETERS) / slope**2
-    jacobian = model(points[near], parameters)[1]
-    singular, rotation = np.linalg.svd(jacobian, full_matrices=False)[1:]
-    if not singular[-1] > 0:
-        return None
-    covariance = variance * (rotation.T / singular**2) @ rotation
-    condition = float(singular[0] / singular[-1])
+    variance = ((weights * distances) ** 2).sum() / (n_near - N_PARAMETERS) / slope**2
+    inverse, condition = _inverse_normal(model(points[near], parameters)[1])
     rss = float((weights * distances**2).sum())
-    return _Fit(parameters, covariance, sigma, rss, weights, condition)
+    return _Fit(parameters, variance * inverse, sigma, rss, weights, condition)
 
 
 def _spread(distances: Array) -> float:
@@ -326,66 +347,3 @@ def _spread(distances: Array) -> float:
 
 def _tukey(q: Array) -> Array:
     return np.where(np.abs(q) < 1, (1 - q**2) ** 2, 0.0)
-
-
-def _orthogonal(points: Array, parameters: Array) -> tuple[Array, Array]:
-    """Signed orthogonal distances (n,), outside positive, and their derivatives (n, 5).
-
-    The foot of a point slides along the ellipse, across the normal n, so the distance
-    changes only with the ellipse's own motion at the foot: -n·∂(c + S·u).
-    """
-    mean, cos_part, sin_part = parameters[2:]
-    half_difference = np.hypot(cos_part, sin_part)
-    angle = 0.5 * np.arctan2(sin_part, cos_part)
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    axes = np.array([mean + half_difference, mean - half_difference])
-    # A trial step may turn an axis round: the curve is the same with its length positive.
-    lengths = np.maximum(np.abs(axes), 1e-9)
-    own = (points - parameters[:2]) @ turn
-    on_circle = _foot_on_circle(np.abs(own), lengths) * np.where(own < 0, -1.0, 1.0)
-    normal = on_circle / lengths
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    distance = ((own - on_circle * lengths) * normal).sum(axis=1)
-    (ux, uy), (nx, ny) = turn @ (on_circle * np.sign(axes)).T, turn @ normal.T
-    jacobian = -np.column_stack([nx, ny, nx * ux + ny * uy, nx * ux - ny * uy, nx * uy + ny * ux])
-    return distance, jacobian
-
-
-def _foot_on_circle(points: Array, axes: Array) -> Array:
-    """Where the unit circle holds the nearest points of an ellipse with these semi-axes.
-
-    Newton's iteration for t in (a x / (t + a²))² + (b y / (t + b²))² = 1; from the left
-    of the root, where it starts, it converges without leaving that side, for any point.
-    """
-    stretched = np.maximum(points, 1e-14 * axes) * axes
-    t = (stretched - axes**2).max(axis=1)
-    ratio = stretched / (t[:, None] + axes**2)
-    for _ in range(60):
-        excess = (ratio**2).sum(axis=1) - 1
-        step = 0.5 * excess / (ratio**2 / (t[:, None] + axes**2)).sum(axis=1)
-        t += np.maximum(step, 0.0)
-        ratio = stretched / (t[:, None] + axes**2)
-        if excess.max() < 1e-12:
-            break
-    return np.asarray(ratio / np.linalg.norm(ratio, axis=1, keepdims=True))
-
-
-def _radial(points: Array, parameters: Array) -> tuple[Array, Array]:
-    """Distances along the rays from the centre (n,), and their derivatives (n, 5).
-
-    v = d - r, equations 2 and 3 of the paper: with y = S⁻¹(x - c) the ray meets the
-    ellipse at r = d / |y|.
-    """
-    x, y, mean, cos_part, sin_part = parameters
-    inverse = np.linalg.inv(np.array([[mean + cos_part, sin_part], [sin_part, mean - cos_part]]))
-    offset = points - np.array([x, y])
-    d = np.linalg.norm(offset, axis=1)
-    on_unit = offset @ inverse
-    rho = np.linalg.norm(on_unit, axis=1)
-    gradient = (on_unit @ inverse) / rho[:, None]
-    (gx, gy), (ux, uy) = gradient.T, on_unit.T
-    ray = (offset / d[:, None]) * (1 - 1 / rho)[:, None]
-    by_scale = -(d / rho**2)[:, None]
-    by_shape = np.column_stack([gx * ux + gy * uy, gx * ux - gy * uy, gx * uy + gy * ux])
-    jacobian = np.column_stack([by_scale * gradient - ray, by_scale * by_shape])
-    return d * (1 - 1 / rho), jacobian
