@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
 from pipecore.elements.fittings import End, propose_bends, propose_flanges, propose_reducers
+from pipecore.elements.joining import join_straights
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import LONG_PIECE, Piece, find_pieces
 from pipecore.elements.refine import Fitted, refine_piece
@@ -67,6 +68,7 @@ def build_elements(
     surface is reported once.
     """
     fitted, links = refine_pieces(pieces, nearby, settings, progress)
+    fitted, links = join_straights(fitted, links)
     axes = [f.axis for f in fitted]
     for fitting, straight in links:
         axes[straight], axes[fitting] = _trimmed_to_fitting(axes[straight], axes[fitting])
@@ -88,20 +90,20 @@ def refine_pieces(
 
     Returns the fitted pieces, and pairs (fitting, straight) that belong together.
 
-    Long straights come first, then the fittings that they ask for, then the bends,
-    short straights and spheres that the ellipses show on their own.
+    Spheres and long straights come first, then the fittings that these ask for, then
+    the bends and short straights that the ellipses show on their own.
     """
     keeper = _Keeper(nearby, settings)
-    long, rest = _by_support(pieces)
-    for i, piece in enumerate(long):
-        progress.update("elements", 0.3 + 0.35 * i / len(long))
+    spheres, straights, rest = _by_support(pieces)
+    for i, piece in enumerate(spheres + straights):
+        progress.update("elements", 0.3 + 0.35 * i / len(spheres + straights))
         keeper.try_piece(piece)
     progress.update("elements", 0.65)
-    straights = list(keeper.fitted)
-    for piece, ends in propose_bends(straights, nearby):
+    joinable = list(keeper.fitted)
+    for piece, ends in propose_bends(joinable, nearby):
         progress.update("elements", 0.67)
         keeper.try_piece(piece, between=ends)
-    for piece, ends in propose_reducers(straights):
+    for piece, ends in propose_reducers(joinable):
         keeper.try_piece(piece, between=ends)
     for i, piece in enumerate(rest):
         progress.update("elements", 0.7 + 0.25 * i / len(rest))
@@ -113,28 +115,23 @@ def refine_pieces(
     return keeper.fitted, keeper.links
 
 
-def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece]]:
-    """Long straights and the rest, each with most ellipses first, spheres last.
+def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece], list[Piece]]:
+    """Spheres, long straights and the rest, each with most ellipses first.
 
     Equal counts are told apart by place, not by the order in which they were found.
     """
-    ordered = sorted(
-        pieces,
-        key=lambda p: (
-            isinstance(p.model, SphereSurface),
-            -len(p.ellipses),
-            p.model.radius,
-            *p.model.position.tolist(),
-        ),
-    )
-    long = [
-        p
-        for p in ordered
-        if isinstance(p.model, LineSurface)
-        and not p.model.is_tapered
-        and p.high - p.low > LONG_PIECE * p.model.radius
-    ]
-    return long, [p for p in ordered if p not in long]
+    groups: tuple[list[Piece], list[Piece], list[Piece]] = ([], [], [])
+    for piece in sorted(
+        pieces, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
+    ):
+        match piece.model:
+            case SphereSurface():
+                groups[0].append(piece)
+            case LineSurface(is_tapered=False, radius=r) if piece.high - piece.low > LONG_PIECE * r:
+                groups[1].append(piece)
+            case _:
+                groups[2].append(piece)
+    return groups
 
 
 class _Keeper:

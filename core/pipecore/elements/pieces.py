@@ -73,16 +73,13 @@ def find_pieces(
     progress : Progress
     """
     pieces = find_spheres(ellipses)
-    free = np.ones(len(ellipses), np.bool_)
-    for piece in pieces:
-        free[piece.ellipses] = False
     order = np.argsort(chain, kind="stable")
     chains = np.split(order, np.flatnonzero(np.diff(chain[order])) + 1)
     for i, members in enumerate(chains):
         progress.update("elements", 0.3 * i / max(len(chains), 1))
         if len(members) < MIN_ELLIPSES:
             continue
-        pieces += _explain_chain(ellipses, members[free[members]], width, progress)
+        pieces += _explain_chain(ellipses, members, width, progress)
     return pieces
 
 
