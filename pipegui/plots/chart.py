@@ -62,7 +62,7 @@ class Chart(QWidget):
         if self._dark == theme.is_dark():
             return False
         self._dark = theme.is_dark()
-        self.canvas.setBackground(theme.colour("base"))
+        self.canvas.setBackground(theme.colour("window"))
         muted = theme.colour("muted").name()
         self.empty.setStyleSheet(f"color: {muted}")
         self.readout.setStyleSheet(f"color: {muted}")

@@ -19,6 +19,8 @@ from pipegui.view_state import MapState
 
 EMPTY = "Select an element to see its surface unrolled."
 DEGREES = ((-180, "6:00"), (-90, "9:00"), (0, "12:00"), (90, "3:00"), (180, "6:00"))
+MARGIN_DEG = 190
+"""The map ends at ± 180°; the rest is room for the labels there."""
 WHOLE_ROUND = np.deg2rad(330)
 """A deformation wider than this goes all the way round."""
 
@@ -39,8 +41,8 @@ class DeviationMap(Chart):
         self.header.addStretch(1)
         self.plot = self.add_plot(0, "Clock", "Chainage, m")
         self.plot.getAxis("left").setTicks([DEGREES])
-        self.plot.setYRange(-180, 180, padding=0)
-        self.plot.setLimits(yMin=-180, yMax=180)
+        self.plot.setYRange(-MARGIN_DEG, MARGIN_DEG, padding=0)
+        self.plot.setLimits(yMin=-MARGIN_DEG, yMax=MARGIN_DEG)
         self._image = pg.ImageItem(axisOrder="row-major")
         self._shapes: list[object] = []
         self.plot.addItem(self._image)
@@ -79,7 +81,7 @@ class DeviationMap(Chart):
         values = self._map.deviation_mm.T
         colours = deviation_colours(values, self._state.limit_mm)
         opaque = np.where(np.isfinite(values), 255, 0).astype(np.uint8)
-        self._image.setImage(np.dstack([colours, opaque]))
+        self._image.setImage(np.dstack([colours, opaque]), levels=(0, 255))
         self._image.setRect(QRectF(self._map.start, -180, self._map.length, 360))
 
     def _draw_shapes(self) -> None:

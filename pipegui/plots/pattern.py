@@ -1,4 +1,4 @@
-"""Numbers behind the radius plot: the fitted pattern, the mean and its band. Qt-free."""
+"""Numbers behind the radius plot: the fitted pattern, the middle and its band. Qt-free."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class Pattern:
         Semi-minor axes of the ellipses and the standard deviations of the radii.
     fitted : ndarray, shape (m,)
         The element's radius there: constant, linear or a semicircle.
-    mean : ndarray, shape (m,)
+    moved : ndarray, shape (m,)
         The fitted pattern moved onto the middle of the values.
     spread : float
         Robust standard deviation of the values about it.
@@ -27,8 +27,13 @@ class Pattern:
     values: Array
     sd: Array
     fitted: Array
-    mean: Array
+    moved: Array
     spread: float
+
+    @property
+    def middle(self) -> float:
+        """Where a constant pattern lies when moved onto the values."""
+        return float(self.moved.mean())
 
 
 def pattern_of(element: Element, profiles: Profiles) -> Pattern:

@@ -125,15 +125,16 @@ class RadiusPlot(Chart):
 
     def _draw_band(self, pattern: Pattern, colour: QColor) -> None:
         order = np.argsort(self._x, kind="stable")
-        x, mean = self._x[order], pattern.mean[order]
+        x, moved = self._x[order], pattern.moved[order]
         edges = [
-            pg.PlotDataItem(x, mean + side * pattern.spread, pen=pg.mkPen(None)) for side in (-1, 1)
+            pg.PlotDataItem(x, moved + side * pattern.spread, pen=pg.mkPen(None))
+            for side in (-1, 1)
         ]
         for edge in edges:
             self.radius.addItem(edge)
         self.radius.addItem(pg.FillBetweenItem(*edges, brush=faint(colour, 0.16)))
         dashed = pg.mkPen(colour, width=1.5, style=Qt.PenStyle.DashLine)
-        self.radius.plot(x, mean, pen=dashed, antialias=True)
+        self.radius.plot(x, moved, pen=dashed, antialias=True)
 
     def _draw_points(
         self, plot: pg.PlotItem, values: Array, colour: QColor, sd: Array | None = None
@@ -169,6 +170,7 @@ class RadiusPlot(Chart):
                 pg.InfiniteLine(float(ends.mean()), pen=pg.mkPen(None)),
                 text,
                 position=0.93,
+                anchors=[(0.5, 0.5), (0.5, 0.5)],
                 color=colour,
             )
             label.setFont(small(self.font()))
@@ -198,12 +200,14 @@ class RadiusPlot(Chart):
                 )
 
     def _describe(self, pattern: Pattern, data: QColor, fitted: QColor) -> None:
-        middle = format_measure(float(np.nanmean(pattern.mean)), pattern.spread, "mm")
+        scatter = f"scatter ± {format_measure(pattern.spread, unit='mm', decimals=2)}"
+        if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
+            scatter = f"median {format_measure(pattern.middle, decimals=2)}, {scatter}"
         dot, line, dash, band = (
             f'<span style="color:{c.name()}">{s}</span>'
             for c, s in ((data, "●"), (fitted, "━"), (data, "╍"), (faint(data, 1), "▒"))
         )
-        self.key.setText(f"{dot} profiles&nbsp; {line} fitted&nbsp; {dash} {band} mean {middle}")
+        self.key.setText(f"{dot} profiles&nbsp; {line} fitted&nbsp; {dash} {band} {scatter}")
 
     def _fit(self) -> None:
         """Show all points with a margin; a few wild ones must not flatten the rest."""

@@ -46,7 +46,7 @@ class SectionView(Chart):
         self.factor.setMaximumWidth(120)
         self.factor.setToolTip("Draws deviations from the undeformed contour larger.")
         self.factor.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.factor.valueChanged.connect(self._draw)
+        self.factor.valueChanged.connect(self._exaggerate)
         self.factor_text = QLabel("1×")
         self.factor_text.setMinimumWidth(self.fontMetrics().horizontalAdvance("20×"))
         for widget in (self.back, self.title, self.ahead):
@@ -74,8 +74,9 @@ class SectionView(Chart):
         if state.profile is None:
             self.plot.clear()
             return
-        self.title.setText(f"Profile {state.position} of {state.count}")
-        self.title.setToolTip(state.stack_name)
+        index, chainage = int(state.profile.profile_index[0]), float(state.profile.chainage[0])
+        self.title.setText(f"Profile {index} · {chainage:.3f} m")
+        self.title.setToolTip(f"{state.position} of {state.count} · {state.stack_name}")
         self.back.setEnabled(state.position > 1)
         self.ahead.setEnabled(state.position < state.count)
         self.dimensions.setText(dimensions_text(state.profile))
@@ -84,6 +85,10 @@ class SectionView(Chart):
             self._fit()
 
     # Drawing
+
+    def _exaggerate(self) -> None:
+        self._draw()
+        self._fit()
 
     def _draw(self) -> None:
         state, factor = self._state, self.factor.value()
@@ -133,6 +138,10 @@ class SectionView(Chart):
         reference = self._state.reference
         if reference is not None:
             (u, v), reach = reference.centre_uv, 1.35 * reference.semi_major_mm
+            if len(self._state.points_uv):
+                drawn = exaggerate(self._state.points_uv, reference, self.factor.value())
+                away = np.linalg.norm(drawn - reference.centre_uv, axis=1)
+                reach = max(reach, 1.05 * float(np.percentile(away, 99)))
             self.plot.setRange(xRange=(u - reach, u + reach), yRange=(v - reach, v + reach))
 
     # Mouse and keys

@@ -9,7 +9,10 @@ from pipecore.geometry import Array
 from pipecore.types import Element
 
 CELL_RADII = 0.1
-"""Size of a cell in radii of the pipe."""
+"""Size of a cell in radii of the pipe; larger where there are too few points."""
+LARGEST_CELL_RADII = 0.4
+ENOUGH_POINTS = 3
+"""Median number in the cells that have any."""
 MAX_CELLS_ALONG = 4000
 
 
@@ -51,14 +54,18 @@ def unroll(element: Element, chainage: Array, clock: Array, deviation: Array) ->
     start = min(0.0, float(chainage.min(initial=0.0)))
     stop = max(element.axis.length, float(chainage.max(initial=0.0)))
     length = max(stop - start, 1e-3)
-    n_around = round(2 * np.pi / CELL_RADII)
-    n_along = int(np.clip(np.ceil(length / (CELL_RADII * element.radius)), 1, MAX_CELLS_ALONG))
-    along = np.clip(((chainage - start) / length * n_along).astype(np.intp), 0, n_along - 1)
-    around = ((from_clock(clock) + np.pi) / (2 * np.pi) * n_around).astype(np.intp) % n_around
-    cell = along * n_around + around
-    n_cells = n_along * n_around
-    counts = np.bincount(cell, minlength=n_cells)
-    sums = np.bincount(cell, weights=1000 * deviation, minlength=n_cells)
+    size = CELL_RADII
+    while True:
+        n_around = round(2 * np.pi / size)
+        n_along = int(np.clip(np.ceil(length / (size * element.radius)), 1, MAX_CELLS_ALONG))
+        along = np.clip(((chainage - start) / length * n_along).astype(np.intp), 0, n_along - 1)
+        around = ((from_clock(clock) + np.pi) / (2 * np.pi) * n_around).astype(np.intp) % n_around
+        counts = np.bincount(along * n_around + around, minlength=n_along * n_around)
+        has_enough = not counts.any() or np.median(counts[counts > 0]) >= ENOUGH_POINTS
+        if has_enough or size * np.sqrt(2) > LARGEST_CELL_RADII:
+            break
+        size *= np.sqrt(2)
+    sums = np.bincount(along * n_around + around, 1000 * deviation, n_along * n_around)
     means = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
     shape = (n_along, n_around)
     return Unrolled(means.reshape(shape), counts.reshape(shape), start, length)

@@ -61,7 +61,7 @@ def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> 
 def _aim_at_profile(profile: Profiles, pose: Pose) -> Pose:
     """Follow from profile to profile; turn only where the ellipse would look like a line."""
     radius, normal = float(profile.radius[0]), profile.normal[0]
-    distance = float(np.clip(pose.distance, 8 * radius, 24 * radius))
+    distance = float(np.clip(pose.distance, 12 * radius, 30 * radius))
     pose = replace(pose, focus=profile.centre[0], distance=distance)
     turned = [
         replace(pose, heading=pose.heading + turn, elevation=float(np.clip(tilt, -1.2, 1.2)))

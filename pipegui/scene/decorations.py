@@ -30,6 +30,7 @@ class Decorations:
     def __init__(self, layers: list[vtkRenderer]) -> None:
         self._layers = layers
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
+        self._accented: vtkActor | None = None
 
     def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
         """Show the decorations of `state` where they differ from `before`."""
@@ -48,8 +49,14 @@ class Decorations:
         if everything or state.profile is not before.profile:
             self._replace("profile", self._profile(state))
 
+    def set_point_size(self, pixels: float) -> None:
+        """Draw the points of the selection a little larger than the others, over them."""
+        if self._accented is not None:
+            self._accented.GetProperty().SetPointSize(pixels + 1)
+
     def clear(self) -> None:
         """Take all away."""
+        self._accented = None
         for name in list(self._groups):
             self._replace(name, ())
 
@@ -87,6 +94,7 @@ class Decorations:
             yield 0, _lines(shapes.ellipse_lines(profiles), theme.colour("text"), 1.0, 0.8)
 
     def _highlight(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        self._accented = None
         element = selected_element(state)
         if element is None:
             return
@@ -97,7 +105,7 @@ class Decorations:
             rows = rows[:: max(1, -(-len(rows) // MAX_HIGHLIGHTED))]
             if len(rows):
                 actor = _points(state.cloud.xyz[rows], accent)
-                actor.GetProperty().SetPointSize(3.0)
+                self._accented = actor
                 yield 0, actor
         yield 1, _lines(shapes.axis_lines((element,)), accent, 2.5)
         yield 1, _lines(shapes.end_rings(element), accent, 2.0)

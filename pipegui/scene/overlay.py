@@ -92,8 +92,13 @@ class Overlay(QWidget):
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        taken = [self._draw_triad(painter, self._pose)]
-        taken.append(self._draw_scale_bar(painter, self._projection, self._pose))
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(_paper(170))
+        corner = QRectF(SPACING, self.height() - 13 * SPACING, 32 * SPACING, 12 * SPACING)
+        painter.drawRoundedRect(corner, 4, 4)
+        taken = [corner]
+        self._draw_triad(painter, self._pose)
+        self._draw_scale_bar(painter, self._projection, self._pose)
         if self.legend is not None:
             taken.append(self._draw_legend(painter, self.legend))
         self._draw_labels(painter, self._projection, taken)
@@ -197,7 +202,7 @@ class Overlay(QWidget):
 
     # Scale and directions
 
-    def _draw_triad(self, painter: QPainter, pose: Pose) -> QRectF:
+    def _draw_triad(self, painter: QPainter, pose: Pose) -> None:
         reach = TRIAD_PX + 16
         middle = QPointF(SPACING + reach, self.height() - SPACING - reach)
         names: list[QRectF] = []
@@ -214,9 +219,8 @@ class Overlay(QWidget):
             if is_free and np.hypot(tip.x(), tip.y()) > 0.25:
                 names.append(box)
                 painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
-        return QRectF(middle.x() - reach, middle.y() - reach, 2 * reach, 2 * reach)
 
-    def _draw_scale_bar(self, painter: QPainter, projection: Projection, pose: Pose) -> QRectF:
+    def _draw_scale_bar(self, painter: QPainter, projection: Projection, pose: Pose) -> None:
         pixel = projection.pixel_size(pose.distance)
         metres = round_length(SCALE_BAR_PX * pixel)
         length = metres / pixel
@@ -227,10 +231,9 @@ class Overlay(QWidget):
             painter.drawLine(QPointF(left + a[0], y + a[1]), QPointF(left + b[0], y + b[1]))
         box = QRectF(left, y - 26, length, 20)
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, length_text(metres))
-        return box.adjusted(-4, 0, 4, 14)
 
 
-def _paper() -> QColor:
+def _paper(alpha: int = 225) -> QColor:
     paper = QColor(theme.colour("base"))
-    paper.setAlpha(225)
+    paper.setAlpha(alpha)
     return paper

@@ -57,6 +57,7 @@ class PointLayer:
         self._is_new: set[int] = set()
         self.xyz = np.empty((0, 3), np.float32)
         self.spacing = 0.01
+        self.point_px = MAX_POINT_PX
 
     @property
     def quick_xyz(self) -> NDArray[np.float32]:
@@ -107,8 +108,8 @@ class PointLayer:
             actor.SetVisibility(i == self._shown)
             if i == self._shown:
                 spacing = self.spacing * np.sqrt(min(len(self.xyz) / count, 4))
-                size = np.clip(1.2 * spacing / pixel_size, 1.5, MAX_POINT_PX)
-                actor.GetProperty().SetPointSize(float(size))
+                self.point_px = float(np.clip(1.2 * spacing / pixel_size, 1.5, MAX_POINT_PX))
+                actor.GetProperty().SetPointSize(self.point_px)
 
     @property
     def n_shown(self) -> int:
@@ -121,7 +122,9 @@ class PointLayer:
             self._is_new.discard(self._shown)
         elif self._shown >= 0:
             measured = max(seconds - FRAME_SECONDS, 1e-4) / self.n_shown
-            self._seconds_per_point = (self._seconds_per_point + measured) / 2
+            # A frame of few points says little about what a point costs.
+            weight = 0.5 * min(self.n_shown / MOVING_LEVEL, 1)
+            self._seconds_per_point += weight * (measured - self._seconds_per_point)
 
     def clear_actors(self) -> None:
         """Take all points out of the renderer."""

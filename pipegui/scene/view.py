@@ -164,6 +164,7 @@ class SceneView(QWidget):
             pixel_size=projection.pixel_size(canvas.pose.distance),
             visible=self._state.view.show_points,
         )
+        self._decorations.set_point_size(self.points.point_px)
         self.overlay.follow(projection, canvas.pose)
 
     # Mouse
