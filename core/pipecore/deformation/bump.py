@@ -2,11 +2,13 @@
 
 The bump is h·b(ρ) + c over an ellipse, where ρ is the distance from its peak in shares of
 half its length and half its width, and c is what the contour may be off by. Its section
-b is a cosine, cos²(π/2 · ρᑫ): plain for q = 1, flat-bottomed above, pointed below.
+b is a cosine, cos²(π/2 · ρᑫ), plain for q = 1, flat-bottomed above, or a cone, 1 - ρ:
+whichever fits best by AIC where the bump is clear, else the plain cosine.
 Length and width are where the bump has come back to zero, so that a cosine bump of
 nominal extent has just that extent.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,13 +18,13 @@ from scipy.optimize import least_squares
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
-MIN_EXTENT, MAX_EXTENT = 0.1, 3.0
-"""Bounds of a bump's length and width, shares of the outside diameter."""
+MIN_EXTENT, MAX_LENGTH, MAX_WIDTH = 0.1, 3.0, 1.5
+"""Bounds of a bump's extents, shares of the outside diameter: beyond, it is no dent."""
 
 TYPICAL_EXTENT, EXTENT_PRIOR = 0.5, 1.0
 """Extents believed in beforehand (shares of the diameter), and the sd of their logarithms."""
 
-CLEAR = 12.0
+CLEAR = 20.0
 """Significance from which the form is fitted as well (flat-bottomed, pointed)."""
 
 CORE = 0.75
@@ -31,8 +33,15 @@ CORE = 0.75
 HEIGHT_PRIOR = 0.5
 """Standard deviation of heights believed in beforehand, share of the diameter."""
 
+FORM_HANDICAP = 4.0
+"""How much better than a plain cosine another form has to fit."""
+
 FORM_PRIOR, ROUNDNESS_PRIOR = 0.4, 0.5
 """Weak beliefs: standard deviations of log q around 0, and of log(length / width) around 0."""
+
+
+Shape = Callable[[Array, float], Array]
+"""Height of a bump of height one at ρ, given q."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +74,13 @@ class _Fit:
     parameters: Array
     covariance: Array
     chi2: float
+    shape: Shape
+
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion, with the handicap of the less common forms."""
+        is_plain = self.shape is bump_shape and len(self.parameters) == 6
+        return self.chi2 + 2 * len(self.parameters) + (0.0 if is_plain else FORM_HANDICAP)
 
 
 def fit_bump(
@@ -102,17 +118,19 @@ def fit_bump(
         plain = _fit(data, first, diameter, contour_sd)
         first = plain.parameters
         length, width = np.exp(first[3:5])
-        if min(length, width) < MIN_EXTENT * diameter or max(length, width) > MAX_EXTENT * diameter:
+        if min(length, width) < MIN_EXTENT * diameter:
             return None
-    best, doubt = plain, 0.0
+        if length > MAX_LENGTH * diameter or width > MAX_WIDTH * diameter:
+            return None
+    fits = [plain]
     if abs(first[0]) > CLEAR * _height_sd((data[0], data[1], data[3]), length, width):
-        free = _fit(data, np.append(first, 0.0), diameter, contour_sd)
-        gain = plain.chi2 - free.chi2 - 2  # by AIC: one parameter more has to be worth it
-        if gain > 0:
-            best = free
-        # That it may be the other form is part of the uncertainty of the height.
-        share = 1 / (1 + np.exp(min(abs(gain), 50.0) / 2))
-        doubt = share * (free.parameters[0] - plain.parameters[0]) ** 2
+        fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd))
+        fits.append(_fit(data, first, diameter, contour_sd, cone))
+    best = min(fits, key=lambda fit: fit.aic)
+    # That it may be another form is part of the uncertainty of the height.
+    likely = np.exp(-0.5 * (np.array([fit.aic for fit in fits]) - best.aic))
+    others = np.array([fit.parameters[0] for fit in fits]) - best.parameters[0]
+    doubt = float(likely @ others**2 / likely.sum())
     height, along_peak, around_peak = best.parameters[:3]
     length, width = np.exp(best.parameters[3:5])
     misfit = _core_misfit(data, best)
@@ -137,9 +155,14 @@ def fit_bump(
 
 
 def bump_shape(rho: Array, q: float = 1.0) -> Array:
-    """Values of the bump (1 at the peak, 0 from ρ = 1 on)."""
+    """Values of the cosine bump (1 at the peak, 0 from ρ = 1 on)."""
     t = np.minimum(rho, 1.0)
     return np.asarray(np.cos(np.pi / 2 * (t if q == 1.0 else t**q)) ** 2)
+
+
+def cone(rho: Array, _q: float = 1.0) -> Array:
+    """Values of a pointed bump."""
+    return np.asarray(1.0 - np.minimum(rho, 1.0))
 
 
 def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
@@ -151,7 +174,7 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     if np.count_nonzero(core) < 3:
         return np.inf
     q = float(np.exp(p[6])) if len(p) > 6 else 1.0
-    residual = (deviation - p[0] * bump_shape(rho, q) - p[5])[core] / noise[core]
+    residual = (deviation - p[0] * fit.shape(rho, q) - p[5])[core] / noise[core]
     return float(np.sqrt(np.mean(residual**2)))
 
 
@@ -162,7 +185,13 @@ def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:
     return float(1.0 / np.sqrt(max(np.sum((b / noise) ** 2), 1e-12)))
 
 
-def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: float) -> _Fit:
+def _fit(
+    data: tuple[Array, ...],
+    first: Array,
+    diameter: float,
+    contour_sd: float,
+    shape: Shape = bump_shape,
+) -> _Fit:
     along, around, deviation, noise = data
     extent_log = np.log(TYPICAL_EXTENT * diameter)
     slack = 0.3 * np.exp(first[3:5])
@@ -170,7 +199,7 @@ def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: flo
     def residuals(p: Array) -> Array:
         q = float(np.exp(p[6])) if len(p) > 6 else 1.0
         u, v = 2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4])
-        model = p[0] * bump_shape(np.hypot(u, v), q) + p[5]
+        model = p[0] * shape(np.hypot(u, v), q) + p[5]
         beliefs = [
             p[0] / (HEIGHT_PRIOR * diameter),
             *(p[1:3] / slack),
@@ -193,7 +222,7 @@ def _fit(data: tuple[Array, ...], first: Array, diameter: float, contour_sd: flo
         xtol=1e-5,
     )
     information = answer.jac.T @ answer.jac
-    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost))
+    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost), shape)
 
 
 def _thin(

@@ -44,13 +44,12 @@ def measure_centre_line(contour: Contour) -> CentreLine:
     covariance = contour.term_covariance[inner, 1:3, 1:3]
     variance = [float(side @ covariance[i] @ side) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
-    return CentreLine(
-        float(distance[peak]),
-        float(sd),
-        float(s[peak]),
-        float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi)),
-        _is_kink(s, deviation @ side, covariance, side),
-    )
+    clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
+    kink = _find_kink(s, deviation @ side, covariance, side)
+    if kink is not None:
+        # The contour is smooth and rounds the corner; the two straight pieces do not.
+        return CentreLine(kink[1], float(sd), kink[0], clock, True)
+    return CentreLine(float(distance[peak]), float(sd), float(s[peak]), clock, False)
 
 
 def _chord(s: Array, offset: Array) -> Array:
@@ -58,8 +57,10 @@ def _chord(s: Array, offset: Array) -> Array:
     return np.asarray(offset[0] * (1 - share) + offset[-1] * share)
 
 
-def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
-    """Whether two straight pieces fit the line of centres better than smooth bows.
+def _find_kink(
+    s: Array, lateral: Array, covariance: Array, side: Array
+) -> tuple[float, float] | None:
+    """Chainage and sag of a kink, if two straight pieces fit better than smooth bows.
 
     These are a parabola and the line of a beam clamped at both ends, with as many
     parameters as the two pieces.
@@ -67,7 +68,7 @@ def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
     step = max(1, len(s) // 40)
     s, lateral = s[::step], lateral[::step]
     if len(s) < 8:
-        return False
+        return None
     sd = np.sqrt(np.einsum("k,rkl,l->r", side, covariance[::step], side))
     x = (s - s[0]) / (s[-1] - s[0])
 
@@ -77,9 +78,12 @@ def _is_kink(s: Array, lateral: Array, covariance: Array, side: Array) -> bool:
         return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
 
     smooth, _ = chi2([np.ones_like(x), x, x**2, np.cos(2 * np.pi * x)])
-    best, angle = np.inf, 0.0
+    best, turn, where = np.inf, 0.0, 0.0
     for knee in x[2:-2]:
         value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
         if value < best:
-            best, angle = value, abs(float(solution[2])) / (s[-1] - s[0])
-    return bool(best + KINK_ADVANTAGE < smooth and angle > MIN_KINK)
+            best, turn, where = value, abs(float(solution[2])), float(knee)
+    length = float(s[-1] - s[0])
+    if best + KINK_ADVANTAGE > smooth or turn / length < MIN_KINK:
+        return None
+    return float(s[0]) + where * length, turn * where * (1 - where)

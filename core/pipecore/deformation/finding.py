@@ -120,7 +120,7 @@ def find_deformations(
         straightness, bow = _measure_bow(
             element, surface, heights, patches, n_terms=n_terms, settings=settings
         )
-        deformations += bow
+        deformations = [d for d in deformations if not _is_of_kink(d, bow, surface.grid)] + bow
 
     deviation = np.full(len(xyz), np.nan, np.float32)
     own = surface.belongs
@@ -207,6 +207,16 @@ def _is_of_ovality(patch: Patch, stretches: list[OvalStretch], grid: Grid) -> bo
         and patch.chainage < oval.last * grid.row_size + diameter
         and abs(patch.bump.height) < oval.ovality * grid.radius / 2
         for oval in stretches
+    )
+
+
+def _is_of_kink(found: Deformation, bow: list[Deformation], grid: Grid) -> bool:
+    """Whether a bump is what a smooth contour leaves of a kink."""
+    return any(
+        line.kind is DeformationKind.KINK
+        and abs(found.chainage - line.chainage) < 2 * grid.radius
+        and found.depth < 0.5 * line.depth
+        for line in bow
     )
 
 

@@ -133,7 +133,9 @@ def _measure(
         return None
     chainage = seen.chainage + bump.along / scale
     clock = float(np.mod(seen.clock + bump.around / radius, 2 * np.pi))
-    z = bump.height / float(np.hypot(bump.noise, contour_sd))
+    # Noise alone gains one unit of z² by each of the four parameters of place and size.
+    z_squared = bump.height**2 / (bump.noise**2 + contour_sd**2) - 4.0
+    z = float(np.sign(bump.height) * np.sqrt(max(z_squared, 0.0)))
     return Patch(
         chainage,
         clock,
