@@ -48,7 +48,8 @@ def measure_elements(
     """Measure every element on all points around it."""
     element_id = np.full(n_points, NO_ID, np.int32)
     deviation = np.full(n_points, np.nan, np.float32)
-    elements, profiles, deformations = [], [], []
+    elements, profiles = [], []
+    deformations: list[Deformation] = []
     for i, element in enumerate(built.elements):
         progress.update("deformations", i / len(built.elements))
         radius = max(element.radius, element.radius_end)

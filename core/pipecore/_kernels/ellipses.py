@@ -14,6 +14,9 @@ from numba import njit
 from pipecore._kernels.circles import geometric_circle, taubin_circle
 from pipecore._kernels.eigen import eigenvalues, eigenvector
 
+MAX_FAILURES = 2
+"""A curve is left alone after this many draws in which no piece of it was found."""
+
 
 @njit(cache=True, nogil=True)
 def common_axis(normals, chosen):
@@ -74,13 +77,24 @@ def next_random(state):
 
 @njit(cache=True, nogil=True)
 def pick_pair(normals, free, state):
-    """Two free points whose normals differ clearly: state, indices, or -1 if luck fails."""
-    n = np.uint64(normals.shape[0])
+    """Two free points whose normals differ clearly: state, indices, or -1 if luck fails.
+
+    The points of a curve are listed row by row, so neighbours in the list lie near each
+    other. The second point is drawn from a stretch around the first, of a length drawn
+    from halvings of the curve: where it holds many pipes, far points seldom share one.
+    """
+    n = normals.shape[0]
+    n_halvings = 1
+    while n >> n_halvings > 3:
+        n_halvings += 1
     for _ in range(12):
         state = next_random(state)
-        i = np.int64((state >> np.uint64(33)) % n)
+        reach = n >> np.int64((state >> np.uint64(33)) % np.uint64(n_halvings))
         state = next_random(state)
-        j = np.int64((state >> np.uint64(33)) % n)
+        i = np.int64((state >> np.uint64(33)) % np.uint64(n))
+        state = next_random(state)
+        low, high = max(0, i - reach), min(n, i + reach + 1)
+        j = low + np.int64((state >> np.uint64(33)) % np.uint64(high - low))
         if not free[i] or not free[j]:
             continue
         cos = (
@@ -105,7 +119,7 @@ def best_circle(
     n = uv.shape[0]
     x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     weights = np.empty(n)
-    best = 0
+    best_turn = 0.0
     best_au = best_av = best_ad = best_cx = best_cy = best_r = 0.0
     state = np.uint64(seed) * np.uint64(2862933555777941757) + np.uint64(3037000493)
     for _ in range(n_trials):
@@ -131,16 +145,21 @@ def best_circle(
         r = 0.5 * (r1 + r2)
         if abs(r1 - r2) > 0.25 * r or r > max_radius or r < tolerance:
             continue
-        count = 0
+        slack = tolerance + min(0.05 * r, 2.0 * tolerance)
+        # Points count as far as their normals turn: a floor would lie on any large circle.
+        count = cos2 = sin2 = 0.0
         for k in range(n):
-            if free[k] and fits_circle(
-                x[k], y[k], mx[k], my[k], cx, cy, r, tolerance + 0.05 * r, cos_radial
-            ):
-                count += 1
-        if count > best:
-            best, best_cx, best_cy, best_r = count, cx, cy, r
+            if free[k] and fits_circle(x[k], y[k], mx[k], my[k], cx, cy, r, slack, cos_radial):
+                count += 1.0
+                dx, dy = x[k] - cx, y[k] - cy
+                d2 = dx * dx + dy * dy
+                cos2 += (dx * dx - dy * dy) / d2
+                sin2 += 2.0 * dx * dy / d2
+        turn = count - math.sqrt(cos2 * cos2 + sin2 * sin2)
+        if turn > best_turn:
+            best_turn, best_cx, best_cy, best_r = turn, cx, cy, r
             best_au, best_av, best_ad = au, av, ad
-    if best == 0:
+    if best_turn == 0.0:
         return 0
     au, av, ad, cx, cy, r = best_au, best_av, best_ad, best_cx, best_cy, best_r
     for pass_ in range(3):
@@ -149,7 +168,7 @@ def best_circle(
             cx, cy, r = taubin_circle(x, y, weights)
             if not r > 0.0 or r > max_radius:
                 return 0
-        reach = tolerance + (0.05 * r if pass_ == 0 else 0.0)
+        reach = tolerance + (min(0.05 * r, 2.0 * tolerance) if pass_ == 0 else 0.0)
         best = 0
         for k in range(n):
             inliers[k] = free[k] and fits_circle(
@@ -218,7 +237,8 @@ def split_curves(
         free = np.ones(n, np.bool_)
         inliers = np.empty(n, np.bool_)
         n_free = n
-        for number in range(1, max_pieces + 1):
+        number = n_failed = 0
+        while number < max_pieces and n_failed < MAX_FAILURES and n_free >= min_points:
             count = best_circle(
                 uv[a:b],
                 normals[a:b],
@@ -229,18 +249,18 @@ def split_curves(
                 max_radius,
                 n_trials,
                 # The same curve is split the same way wherever it stands in the list.
-                n + number,
+                n + number + n_failed,
                 inliers,
             )
             if count < min_points:
-                break
+                n_failed += 1
+                continue
+            number += 1
             for k in range(n):
                 if inliers[k]:
                     piece[a + k] = number
                     free[k] = False
             n_free -= count
-            if n_free < min_points:
-                break
 
 
 @njit(cache=True, nogil=True)
@@ -329,13 +349,17 @@ def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits)
         fits[c, 8] = n_in
         fits[c, 9], fits[c, 10] = l1, l2
         fits[c, 11] = n_radial / n
-        det = (
-            xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-        )
+        det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
         if det > 0.0:
-            mu = (bx * (yy * zz - yz * yz) - xy * (by * zz - yz * bz) + xz * (by * yz - yy * bz)) / det
-            mv = (xx * (by * zz - yz * bz) - bx * (xy * zz - yz * xz) + xz * (xy * bz - by * xz)) / det
-            md = (xx * (yy * bz - by * yz) - xy * (xy * bz - by * xz) + bx * (xy * yz - yy * xz)) / det
+            mu = (
+                bx * (yy * zz - yz * yz) - xy * (by * zz - yz * bz) + xz * (by * yz - yy * bz)
+            ) / det
+            mv = (
+                xx * (by * zz - yz * bz) - bx * (xy * zz - yz * xz) + xz * (xy * bz - by * xz)
+            ) / det
+            md = (
+                xx * (yy * bz - by * yz) - xy * (xy * bz - by * xz) + bx * (xy * yz - yy * xz)
+            ) / det
             distance = 0.0
             for k in range(n):
                 if weights[k] >= 0.1:

@@ -61,7 +61,7 @@ def join_centres(ellipses: Ellipses, width: float, progress: Progress) -> NDArra
     rank = np.empty(len(sizes), np.int32)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes), dtype=np.int32)
     progress.update("axes", 1.0)
-    return rank[label]
+    return np.asarray(rank[label])
 
 
 def _follow(e: Ellipses, i: NDArray[np.intp], j: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -35,6 +35,8 @@ MAX_SPHERE_MISFIT = 0.001
 """The same for spheres, over patches of the surface: vessel heads are flatter on top."""
 MIN_TAPER_CHANGE = 0.06
 """A cone's radius changes at least by this share."""
+MIN_LENGTH = 0.35
+"""Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
 FLANGE_RATIO = (1.12, 2.8)
 FLANGE_LENGTH = 0.9
 """A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
@@ -80,7 +82,15 @@ def build_elements(
     for i, j in flanges(fitted):
         kinds[i] = ElementKind.FLANGE
         links.append((i, j))
-    return _numbered(fitted, axes, kinds, number_runs(len(fitted), links), nearby, settings)
+    run = number_runs(len(fitted), links)
+    kept = [i for i in range(len(fitted)) if _is_reported(fitted[i], kinds[i], run, i, settings)]
+    return _numbered(
+        [fitted[i] for i in kept],
+        [axes[i] for i in kept],
+        [kinds[i] for i in kept],
+        run[kept],
+        settings,
+    )
 
 
 def refine_pieces(
@@ -170,28 +180,24 @@ class _Keeper:
 
 def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) -> bool:
     """Whether a refined piece is a pipe element and not a corner, a bundle or a chance."""
-    model = found.fit.model
-    radius = model.radius
-    if not settings.min_radius_mm <= radius * 1e3 <= settings.max_radius_mm:
-        return False
-    if found.fit.sigma > max(4.0 * nearby.surface.noise, 0.004) or found.fit.sigma > 0.08 * radius:
-        return False
-    if found.fit.radius_sd > MAX_RADIUS_SD * radius:
+    model, extent = found.fit.model, found.extent
+    radius, radius_sd = model.radius, found.fit.radius_sd
+    is_sized = settings.min_radius_mm <= radius * 1e3 <= settings.max_radius_mm
+    max_sigma = min(max(4.0 * nearby.surface.noise, 0.004), 0.08 * radius)
+    if not is_sized or found.fit.sigma > max_sigma or radius_sd > MAX_RADIUS_SD * radius:
         return False
     if isinstance(model, SphereSurface):
         return len(found.own) >= 60 and found.misfit < MAX_SPHERE_MISFIT * radius + 0.0003
-    if found.extent.coverage < MIN_COVERAGE or found.extent.arc < MIN_ARC:
-        return False
-    if found.extent.arc < SURE_ARC and found.fit.radius_sd > SHARP_RADIUS_SD * radius:
-        return False
-    if found.misfit > MAX_MISFIT * radius + 0.0005:
+    is_round = found.misfit < MAX_MISFIT * radius + 0.0005
+    is_seen = extent.coverage >= MIN_COVERAGE and extent.arc >= MIN_ARC
+    is_sharp = extent.arc >= SURE_ARC or radius_sd < SHARP_RADIUS_SD * radius
+    if not (is_round and is_seen and is_sharp):
         return False
     if isinstance(model, ArcSurface):
         return model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
     if model.is_tapered:
         change = abs(found.radii[1] - found.radii[0])
-        if change < MIN_TAPER_CHANGE * radius or found.axis.length < 0.3 * radius:
-            return False
+        return change > MIN_TAPER_CHANGE * radius and found.axis.length > 0.3 * radius
     return found.axis.length > 2.0 * nearby.surface.voxel
 
 
@@ -204,6 +210,18 @@ def _kind(found: Fitted) -> ElementKind:
         case ArcSurface():
             return ElementKind.TORUS
     return ElementKind.SPHERE
+
+
+def _is_reported(
+    found: Fitted, kind: ElementKind, run: NDArray[np.int32], i: int, settings: ElementSettings
+) -> bool:
+    """Whether an element stands for itself: short straights must be part of a run."""
+    if kind is not ElementKind.CYLINDER:
+        return True
+    shortest = MIN_LENGTH * found.fit.model.radius
+    if (run == run[i]).sum() == 1:
+        shortest = max(shortest, settings.min_length_mm / 1e3)
+    return found.axis.length >= shortest
 
 
 def _trimmed_to_fitting(
@@ -264,7 +282,6 @@ def _numbered(
     axes: list[LineAxis | ArcAxis],
     kinds: list[ElementKind],
     run: NDArray[np.int32],
-    nearby: NearbyPoints,
     settings: ElementSettings,
 ) -> BuiltElements:
     """Elements in their final order: the longest run first, along each run."""
@@ -276,7 +293,8 @@ def _numbered(
         key=lambda i: (-length[run[i]], run[i], *np.round(axes[i].at(axes[i].length / 2), 6)),
     )
     run_id: dict[int, int] = {}
-    elements, own = [], []
+    elements: list[Element] = []
+    own = []
     for i in order:
         found = fitted[i]
         model = found.fit.model

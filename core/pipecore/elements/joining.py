@@ -32,9 +32,7 @@ def join_straights(
         Pairs of pieces that belong together; renumbered.
     """
     spans = [Span(f.axis, f.radii) for f in fitted]
-    pairs = [
-        (i, j) for i, _, j, _ in meeting_ends(spans) if _are_one_pipe(fitted[i], fitted[j])
-    ]
+    pairs = [(i, j) for i, _, j, _ in meeting_ends(spans) if _are_one_pipe(fitted[i], fitted[j])]
     if not pairs:
         return fitted, links
     i, j = np.array(pairs).T

@@ -30,6 +30,8 @@ MAX_CHANGE = 0.06
 SAME_RADIUS = 0.025
 """Radii of one piece differ from its pattern by less than this share (and twice their sd)."""
 MIN_ELLIPSES = 5
+MOSTLY_STRAIGHT = 0.7
+"""What is a bend only at its ends is a straight, such as a vessel between its heads."""
 MIN_SPHERE = 8
 """Ellipses cut off its centre that make a sphere."""
 MIN_TAPER = 0.04
@@ -216,6 +218,13 @@ def _take_arcs(ellipses: Ellipses, members: NDArray[np.intp]) -> list[Piece]:
             break
         chosen = np.flatnonzero(inliers)
         free[chosen] = False
+        straight = np.empty(len(members), np.bool_)
+        n_straight = kernels.best_line(
+            e.centre, e.axis, e.radius, e.radius_sd, inliers, N_TRIALS, False,
+            MIN_COS, MAX_OFFSET, MAX_CHANGE, straight,
+        )  # fmt: skip
+        if n_straight > MOSTLY_STRAIGHT * count:
+            continue
         model = ArcSurface(
             arc[:3].copy(), arc[3:6].copy(), arc[6], float(np.median(e.radius[chosen]))
         )

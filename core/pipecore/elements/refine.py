@@ -1,6 +1,7 @@
 """Refinement: a robust geometric fit of each piece to all points around it, and its extent."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +171,7 @@ def _fit_to(
     thinned: Indices,
     nearby: NearbyPoints,
     scale: float,
-) -> SurfaceFit | None:
+) -> SurfaceFit[Any] | None:
     """Fit the model to all points of the cloud behind thinned ones."""
     if len(thinned) < 15:
         return None

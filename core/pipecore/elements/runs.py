@@ -55,9 +55,11 @@ def meeting_ends(spans: list[Span]) -> list[tuple[int, int, int, int]]:
         offset = MEET_OFFSET * smaller
         fits = (along < reach) & (along > -1.5 * smaller) & (across < offset) & (turn > MEET_COS)
         fits &= np.abs(radius - radius[a]) < 0.8 * smaller
-        for b in np.flatnonzero(fits):
-            if owner[b] != owner[a]:
-                candidates.append((abs(float(along[b])) + float(across[b]), a, int(b)))
+        candidates += [
+            (abs(float(along[b])) + float(across[b]), a, b)
+            for b in map(int, np.flatnonzero(fits))
+            if owner[b] != owner[a]
+        ]
     for _, a, b in sorted(candidates):
         if a not in taken and b not in taken:
             taken |= {a, b}
@@ -71,7 +73,8 @@ def number_runs(n_elements: int, links: list[tuple[int, int]]) -> NDArray[np.int
         return np.arange(n_elements, dtype=np.int32)
     i, j = np.array(links).T
     graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(n_elements, n_elements))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+    _, label = connected_components(graph, directed=False)
+    return np.asarray(label, np.int32)
 
 
 def trim_to_tangent(

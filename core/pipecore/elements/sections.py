@@ -52,7 +52,7 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
     index = index[order]
     # Up and right of the axis, scaled so that a cone's or sphere's taper within a profile
     # does not thicken the section.
-    middle = (index + 0.5) * width
+    middle = np.asarray((index + 0.5) * width, np.float64)
     taper = element.radius_at(middle) - element.radius_at(chainage[inside][order])
     rho = rho[inside][order] + taper
     clock = clock[inside][order]
@@ -74,7 +74,7 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
     semi_major = np.where(is_free, free.semi_major, radius)
     angle = np.where(is_free, free.angle, 0.0)
 
-    at = (rows + 0.5) * width
+    at = np.asarray((rows + 0.5) * width, np.float64)
     up, right = axis.frame(at)
     nominal = element.radius_at(at)
     table = Profiles(

@@ -12,16 +12,16 @@ from pipecore.ellipses.uncertainty import radius_sd_factor
 from pipecore.parallel import for_chunks
 from pipecore.profiles import Curves
 from pipecore.progress import Progress
-from pipecore.settings import EllipseSettings, ElementSettings
+from pipecore.settings import ElementSettings, EllipseSettings
 from pipecore.surface import Surface
 
 __all__ = [
     "Ellipses",
     "PlaneEllipses",
+    "akaike",
     "fit_direct_ellipses",
     "fit_ellipses",
     "radius_sd_factor",
-    "akaike",
 ]
 
 Array = NDArray[np.float64]
@@ -96,7 +96,8 @@ class Ellipses:
 
 def akaike(n_parameters: int, n_points: NDArray[np.integer], rss: Array) -> Array:
     """Akaike's information criterion, equation 4 of the paper: 2k + n ln(2π·RSS/n)."""
-    return 2 * n_parameters + n_points * np.log(2 * np.pi * np.maximum(rss, 1e-18) / n_points)
+    result = 2 * n_parameters + n_points * np.log(2 * np.pi * np.maximum(rss, 1e-18) / n_points)
+    return np.asarray(result, np.float64)
 
 
 def fit_ellipses(

@@ -103,7 +103,7 @@ def _sampson_squared(conic: Array, x: Array, y: Array) -> Array:
     a, b, c, d, e, f = conic.T
     value = a * x * x + b * x * y + c * y * y + d * x + e * y + f
     gradient = (2 * a * x + b * y + d) ** 2 + (b * x + 2 * c * y + e) ** 2
-    return value**2 / np.maximum(gradient, 1e-300)
+    return np.asarray(value**2 / np.maximum(gradient, 1e-300))
 
 
 def _axes_of_conic(conic: Array) -> tuple[Array, Array, Array, Array]:

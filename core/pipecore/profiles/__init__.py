@@ -26,6 +26,9 @@ GAP_IN_SPACINGS = 2.6
 MIN_CURVE = 6
 """Curves of fewer points are dropped."""
 
+MAX_PIECES = 40
+"""Most pieces that one curve is split into."""
+
 
 @dataclass(frozen=True, eq=False)
 class Curves:
@@ -155,14 +158,14 @@ def segment_profiles(
     def split(first: int, last: int) -> None:
         ellipse_kernels.split_curves(
             curves.uv, curves.normals, curves.starts, first, last, MIN_CURVE, tolerance,
-            0.9, np.cos(np.pi / 4), max_radius, 60, 6, piece,
+            0.9, np.cos(np.pi / 4), max_radius, 60, MAX_PIECES, piece,
         )  # fmt: skip
 
     for_chunks(split, len(curves), 256, "profiles", progress, (middle, end))
     return _group(
         stack, frame, curves.points, curves.uv, curves.normals,
         np.repeat(curves.profile_index, np.diff(curves.starts)),
-        curves.curve_of_point * 8 + piece,
+        curves.curve_of_point * (MAX_PIECES + 1) + piece,
     )  # fmt: skip
 
 

@@ -95,4 +95,4 @@ def _hemisphere(n: int) -> Array:
 
 def _canonical(direction: Array) -> Array:
     """Return the direction with its largest component positive."""
-    return direction * np.sign(direction[np.argmax(np.abs(direction))])
+    return np.asarray(direction * np.sign(direction[np.argmax(np.abs(direction))]))

@@ -22,8 +22,8 @@ def cell_numbers(
     extent = np.floor((xyz.max(axis=0) - low) / edge) + 5
     if np.prod(extent) > 2.0**62:
         raise PipecoreError(
-            f"The points span {extent.max() * edge:.3g} m, too far for cells of {edge * 1e3:.3g} mm; "
-            "crop the cloud or thin it more."
+            f"The points span {extent.max() * edge:.3g} m, too far for cells of "
+            f"{edge * 1e3:.3g} mm; crop the cloud or thin it more."
         )
     keys = np.empty(len(xyz), np.int64)
     n_y, n_z = int(extent[1]), int(extent[2])
