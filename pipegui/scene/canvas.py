@@ -86,7 +86,7 @@ class Canvas(QVTKRenderWindowInteractor):
 
         The widget paints whenever anything over it changes; only `draw` makes VTK work.
         """
-        if not self._is_stale:
+        if not self._is_stale or self.GetRenderWindow() is None:
             self._in_paint = True  # pyvistaqt draws only where this is False
             try:
                 super().paintGL()
@@ -234,7 +234,13 @@ class Canvas(QVTKRenderWindowInteractor):
         self._flight.stop()
         self._resting.stop()
         self.point_under = lambda _: None
+        window = self.GetRenderWindow()
         for layer in self.layers:
             layer.RemoveAllViewProps()
-            self.GetRenderWindow().RemoveRenderer(layer)
-        return super().close()
+            if window is not None:
+                window.RemoveRenderer(layer)
+        self.layers = []
+        closed = super().close()
+        # The window may outlive its closing in Python; what VTK holds must not.
+        self._RenderWindow = self._Iren = None
+        return closed

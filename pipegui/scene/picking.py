@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pipegui.scene.projection import Projection
 
 PICK_RADIUS_PX = 6.0
-LAYER_PX = 24.0
+LAYER_PX = 10.0
 """Points whose depths differ by less than this on screen count as one surface."""
 
 

@@ -233,6 +233,7 @@ class SceneView(QWidget):
         self._hover_timer.stop()
         self._decorations.clear()
         self.points.clear_actors()
+        self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)
 

@@ -1,0 +1,148 @@
+"""Colours of points and their legends, without a window."""
+
+import numpy as np
+import pytest
+
+from pipegui.colour_maps import DEVIATION, QUALITATIVE, deviation_colours
+from pipegui.document import ColourBy, ViewOptions
+from pipegui.scene.colouring import MUTED, colour_points, effective, visible_points
+from pipegui.scene.legend import make_legend
+from pipegui.scene.neighbours import colour_apart, neighbouring_ids
+from tests.factories import make_scan
+
+CLOUD, RESULT = make_scan()
+
+
+def colours_by(colour_by, **options):
+    return colour_points(CLOUD, RESULT, ViewOptions(colour_by=colour_by, **options))
+
+
+def test_that_inward_is_blue_outward_red_and_the_middle_neutral():
+    inward, middle, outward = deviation_colours([-8.0, 0.0, 8.0], 8.0).astype(int)
+    assert inward[2] > inward[0] + 50
+    assert outward[0] > outward[2] + 50
+    assert np.ptp(middle) < 10
+
+
+def test_that_deviation_limits_are_symmetric_and_clip():
+    assert np.array_equal(deviation_colours([-50.0], 10), deviation_colours([-10.0], 10))
+    assert np.array_equal(deviation_colours([50.0], 10)[0], DEVIATION[-1])
+    assert np.array_equal(deviation_colours([0.0], 3), deviation_colours([0.0], 30))
+
+
+def test_that_the_dent_is_bluer_than_its_pipe():
+    colours = colours_by(ColourBy.DEVIATION, deviation_limit_mm=10.0).astype(int)
+    blueness = colours[:, 2] - colours[:, 0]
+    dent = RESULT.deformation(1)
+    in_dent = np.linalg.norm(CLOUD.xyz - dent.peak, axis=1) < 0.03
+    pipe = (RESULT.element_id == dent.element_id) & ~in_dent
+    assert blueness[in_dent].mean() > blueness[pipe].mean() + 50
+
+
+@pytest.mark.parametrize(
+    "colour_by", [ColourBy.SEGMENT, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.DEVIATION]
+)
+@pytest.mark.parametrize("dark", [False, True])
+def test_that_points_of_nothing_are_muted(colour_by, dark):
+    colours = colour_points(CLOUD, RESULT, ViewOptions(colour_by=colour_by), dark=dark)
+    assert (colours[RESULT.element_id == 0] == MUTED[dark]).all()
+    assert not (colours[RESULT.element_id == 2] == MUTED[dark]).all(axis=1).any()
+
+
+def test_that_points_of_one_segment_share_a_colour_and_neighbours_do_not():
+    colours = colours_by(ColourBy.SEGMENT)
+    of_segment = {}
+    for i in range(1, len(RESULT.elements) + 1):
+        (of_segment[i],) = {tuple(c) for c in colours[RESULT.segment_id == i].tolist()}
+    # Along run 1 every element touches the next.
+    assert all(of_segment[i] != of_segment[i + 1] for i in range(1, 6))
+
+
+def test_that_elements_of_one_kind_share_a_colour():
+    colours = colours_by(ColourBy.KIND)
+    by_kind = {}
+    for e in RESULT.elements:
+        by_kind.setdefault(e.kind, set()).update(
+            map(tuple, colours[RESULT.element_id == e.element_id].tolist())
+        )
+    assert all(len(found) == 1 for found in by_kind.values())
+    assert len({c for found in by_kind.values() for c in found}) == len(by_kind)
+
+
+def test_that_profiles_of_a_stack_alternate():
+    colours = colours_by(ColourBy.PROFILE, shown_stack=1)
+    index = RESULT.stacks[0].profile_index(CLOUD.xyz)
+    found = RESULT.segment_id > 0
+    even, odd = (
+        {tuple(c) for c in colours[found & (index % 2 == parity)].tolist()} for parity in (0, 1)
+    )
+    assert len(even) == len(odd) == 1
+    assert even != odd
+
+
+def test_that_height_rises_through_the_map():
+    colours = colours_by(ColourBy.HEIGHT)
+    order = np.argsort(CLOUD.xyz[:, 2])
+    luminance = colours[order].astype(float) @ [0.3, 0.6, 0.1]
+    tenth = len(order) // 10
+    assert luminance[-tenth:].mean() > luminance[:tenth].mean() + 30
+
+
+def test_that_a_colouring_falls_back_on_what_the_cloud_has():
+    bare = type(CLOUD)(origin=CLOUD.origin, xyz=CLOUD.xyz)
+    assert effective(ColourBy.RGB, bare, None) is ColourBy.HEIGHT
+    assert effective(ColourBy.DEVIATION, CLOUD, None) is ColourBy.RGB
+    assert effective(ColourBy.DEVIATION, bare, None) is ColourBy.HEIGHT
+    assert effective(ColourBy.DEVIATION, CLOUD, RESULT) is ColourBy.DEVIATION
+    assert colour_points(bare, None, ViewOptions()).shape == CLOUD.xyz.shape
+
+
+def test_that_a_hidden_element_has_no_visible_points():
+    visible = visible_points(RESULT, frozenset({2, 7}))
+    assert np.array_equal(visible, ~np.isin(RESULT.element_id, (2, 7)))
+    assert visible_points(RESULT, frozenset()) is None
+    # Ids that a new result no longer has hide nothing.
+    assert visible_points(RESULT, frozenset({999})).all()
+
+
+def test_that_the_deviation_legend_names_both_limits_in_mm():
+    view = ViewOptions(colour_by=ColourBy.DEVIATION, deviation_limit_mm=12.5)
+    legend = make_legend(CLOUD, RESULT, view)
+    assert "mm" in legend.title
+    assert [legend.ticks[i][1] for i in (0, 2, -1)] == ["−12.5", "0", "+12.5"]
+
+
+def test_that_the_height_legend_is_in_world_coordinates():
+    legend = make_legend(CLOUD, RESULT, ViewOptions(colour_by=ColourBy.HEIGHT))
+    low, high = float(legend.ticks[0][1]), float(legend.ticks[-1][1])
+    world = CLOUD.world(CLOUD.xyz)[:, 2]
+    assert world.min() - 0.01 <= low < high <= world.max() + 0.01
+
+
+def test_that_the_kind_legend_lists_the_kinds_that_are_there():
+    legend = make_legend(CLOUD, RESULT, ViewOptions(colour_by=ColourBy.KIND))
+    names = {name for _, name in legend.swatches}
+    assert names == {"Pipe", "Bend", "Reducer", "Sphere", "Flange"}
+
+
+def test_that_neighbours_are_those_whose_points_are_near(rng):
+    a = rng.uniform(0, 1, (500, 3))
+    east = np.array([1.0, 0, 0])
+    b, c = a + 1.05 * east, a + 5 * east
+    ids = np.repeat([1, 2, 3, 0], 500).astype(np.int32)
+    xyz = np.concatenate([a, b, c, a + 0.5 * east])
+    assert neighbouring_ids(xyz, ids, 0.3).tolist() == [[1, 2]]
+
+
+def test_that_neighbours_never_share_a_colour_where_there_are_enough(rng):
+    n, n_colours = 60, len(QUALITATIVE)
+    # A random graph in which nobody has more neighbours than there are other colours.
+    degree, pairs = np.zeros(n + 1, int), []
+    for a, b in rng.integers(1, n + 1, (400, 2)).tolist():
+        if a != b and degree[a] < n_colours - 1 and degree[b] < n_colours - 1:
+            pairs.append((a, b))
+            degree[[a, b]] += 1
+    pairs = np.array(pairs, np.int32)
+    colour = colour_apart(n, pairs, n_colours)
+    assert (colour[pairs[:, 0]] != colour[pairs[:, 1]]).all()
+    assert set(colour[1:]) == set(range(n_colours))
