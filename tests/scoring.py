@@ -60,6 +60,8 @@ class Score:
         by one reported element of their kind, and all. One not found is not right.
     radius_errors : dict
         Reported less true radius by true element that has the right kind.
+    radius_sds : dict
+        The standard deviations reported with these radii.
     axis_errors : ndarray
         Distances between true and reported axes at all matched samples; elements with a
         bow or a kink are left out.
@@ -81,6 +83,7 @@ class Score:
     kinds_right: dict[ElementKind, int]
     kinds_judged: dict[ElementKind, int]
     radius_errors: dict[int, float]
+    radius_sds: dict[int, float]
     axis_errors: Array
     bend_radius_errors: dict[int, float]
     missed: tuple[Stretch, ...]
@@ -193,6 +196,7 @@ def score(
         kinds_right=dict(Counter(f.element.kind for f in right)),
         kinds_judged=dict(Counter(f.element.kind for f in judged)),
         radius_errors={f.element.element_id: f.radius_error for f in right},
+        radius_sds={f.element.element_id: f.main.radius_sd for f in right if f.main},
         axis_errors=np.concatenate([np.empty(0), *(f.axis_errors for f in findings)]),
         bend_radius_errors={
             f.element.element_id: f.bend_radius_error
