@@ -48,11 +48,15 @@ class Tally:
     clean_length: float = 0.0
     seconds: list[float] = field(default_factory=list)
 
-    def search(self, scene: PipeScene, rng: np.random.Generator):  # noqa: ANN201
+    def search(self, scene: PipeScene, rng: np.random.Generator):
         scan = scene.scan(rng)
         begin = time.perf_counter()
         found = find_deformations(
-            scan.element, scan.xyz, scan.normals, scan.neighbours, scan.profiles,
+            scan.element,
+            scan.xyz,
+            scan.normals,
+            scan.neighbours,
+            scan.profiles,
             DeformationSettings(),
         )
         self.seconds.append(time.perf_counter() - begin)
@@ -72,7 +76,7 @@ class Tally:
                 s0 = rng.uniform(size, 0.6 * scene.length - 2.0 * r - 0.05)
                 if s0 < size:
                     scene.post = scene.crossing = False
-            scene.shapes = [bump(s0, clock, depth, size, size, r)]
+            scene.shapes = [bump(s0, clock, depth, length=size, width=size, r=r)]
             finding = self.search(scene, rng)
             hit = None
             for d in finding.deformations:
@@ -88,8 +92,16 @@ class Tally:
                 self.missed.append((abs(depth), r))
             else:
                 self.errors.append(
-                    (abs(depth), r, hit.depth, hit.depth_sd, hit.length / size,
-                     hit.width / size, off_peak, hit.significance)
+                    (
+                        abs(depth),
+                        r,
+                        hit.depth,
+                        hit.depth_sd,
+                        hit.length / size,
+                        hit.width / size,
+                        off_peak,
+                        hit.significance,
+                    )
                 )
 
     def clean(self, seed: int, n: int) -> None:
@@ -98,14 +110,22 @@ class Tally:
             scene = random_scene(rng)
             self.clean_length += scene.length
             for d in self.search(scene, rng).deformations:
-                names = [k for k in ("flanges", "elbow", "post", "crossing", "mixed") if getattr(scene, k)]
-                self.false_alarms.append(f"clean {i} r {scene.radius:.3f} L {scene.length:.2f} "
-                                         f"{names} {len(scene.views)} views: {describe(d)}")
+                names = [
+                    k
+                    for k in ("flanges", "elbow", "post", "crossing", "mixed")
+                    if getattr(scene, k)
+                ]
+                self.false_alarms.append(
+                    f"clean {i} r {scene.radius:.3f} L {scene.length:.2f} "
+                    f"{names} {len(scene.views)} views: {describe(d)}"
+                )
 
 
-def describe(d) -> str:  # noqa: ANN001
-    return (f"{d.kind} at {d.chainage:.2f} m, {d.depth * 1e3:.1f} ± {d.depth_sd * 1e3:.1f} mm, "
-            f"{d.length:.2f} × {d.width:.2f} m, z {d.significance:.1f}")
+def describe(d) -> str:
+    return (
+        f"{d.kind} at {d.chainage:.2f} m, {d.depth * 1e3:.1f} ± {d.depth_sd * 1e3:.1f} mm, "
+        f"{d.length:.2f} × {d.width:.2f} m, z {d.significance:.1f}"
+    )
 
 
 def ovality(seed: int, n: int) -> None:
@@ -123,17 +143,29 @@ def ovality(seed: int, n: int) -> None:
         hits = [d for d in found if d.kind is DeformationKind.OVALITY]
         false.update(d.kind for d in found if d.kind is not DeformationKind.OVALITY)
         best = max(hits, key=lambda d: d.significance, default=None)
-        rows.append((arc, ratio, *((best.ovality, best.depth_sd / best.depth * best.ovality,
-                                   best.length) if best else (np.nan,) * 3)))
+        rows.append(
+            (
+                arc,
+                ratio,
+                *(
+                    (best.ovality, best.depth_sd / best.depth * best.ovality, best.length)
+                    if best
+                    else (np.nan,) * 3
+                ),
+            )
+        )
     t = np.array(rows)
     for low in (200, 240):
         some = (np.rad2deg(t[:, 0]) >= low) & (t[:, 1] >= 0.04)
         hit = some & np.isfinite(t[:, 2])
         e = t[hit, 2] - t[hit, 1]
-        print(f"ovality ≥ 4 % over 1 m, arc ≥ {low}°: found {hit.sum()}/{some.sum()}, "
-              f"error median {100 * np.median(np.abs(e)):.2f} 95 % {100 * np.quantile(np.abs(e), 0.95):.2f} "
-              f"bias {100 * np.mean(e):.2f} points, in sd {np.std(e / t[hit, 3]):.2f}, "
-              f"length {np.median(t[hit, 4]):.2f} m")
+        print(
+            f"ovality ≥ 4 % over 1 m, arc ≥ {low}°: found {hit.sum()}/{some.sum()}, "
+            f"error median {100 * np.median(np.abs(e)):.2f} "
+            f"95 % {100 * np.quantile(np.abs(e), 0.95):.2f} "
+            f"bias {100 * np.mean(e):.2f} points, in sd {np.std(e / t[hit, 3]):.2f}, "
+            f"length {np.median(t[hit, 4]):.2f} m"
+        )
     print("   other kinds reported on oval pipes:", dict(false))
 
 
@@ -146,7 +178,7 @@ def bow(seed: int, n: int) -> None:
         length = scene.length = rng.uniform(2, 4)
         sag, kink = rng.uniform(0.008, 0.02), bool(i % 2)
 
-        def offset(s, sag=sag, kink=kink, length=length):  # noqa: ANN001, ANN202
+        def offset(s, sag=sag, kink=kink, length=length):
             bowed = sag * (1 - np.cos(2 * np.pi * s / length)) / 2
             return np.interp(s, [0, length / 2, length], [0, sag, 0]) if kink else bowed
 
@@ -154,8 +186,10 @@ def bow(seed: int, n: int) -> None:
         found_ = Tally().search(scene, rng).deformations
         found.update(("kink" if kink else "bow") + " → " + d.kind for d in found_)
         errors += [d.depth - sag for d in found_ if d.kind not in PATCH and d.kind != "ovality"]
-    print(f"bow and kink of 8-20 mm: {dict(found)} of {n}; error median "
-          f"{1e3 * np.median(np.abs(errors)):.2f} mm, bias {1e3 * np.mean(errors):.2f} mm")
+    print(
+        f"bow and kink of 8-20 mm: {dict(found)} of {n}; error median "
+        f"{1e3 * np.median(np.abs(errors)):.2f} mm, bias {1e3 * np.mean(errors):.2f} mm"
+    )
 
 
 def main(n: int, seed: int) -> None:
@@ -165,31 +199,51 @@ def main(n: int, seed: int) -> None:
     e, missed = np.array(tally.errors), np.array(tally.missed).reshape(-1, 2)
     for least in (0.005, 0.008):
         for low, high in ((0, 1), (0, 0.06), (0.06, 0.12), (0.12, 1)):
-            def n_of(t, low=low, high=high, least=least):  # noqa: ANN001, ANN202
+
+            def n_of(t, low=low, high=high, least=least):
                 return (t[:, 0] >= least) & (t[:, 1] >= low) & (t[:, 1] < high)
+
             hit, lost = n_of(e), n_of(missed)
-            print(f"≥ {least * 1e3:.0f} mm, r {low}-{high} m: found {hit.sum()}/{hit.sum() + lost.sum()}")
+            print(
+                f"≥ {least * 1e3:.0f} mm, r {low}-{high} m: "
+                f"found {hit.sum()}/{hit.sum() + lost.sum()}"
+            )
     some = e[e[:, 0] >= 0.005]
     error = some[:, 2] - some[:, 0]
     relative = error / some[:, 0]
     t = np.abs(error) / some[:, 3]
-    print(f"depth (≥ 5 mm): median error {100 * np.median(np.abs(relative)):.1f} %, "
-          f"bias {100 * np.mean(relative):.1f} % (median {100 * np.median(relative):.1f} %), "
-          f"within 1 sd {100 * np.mean(t < 1):.0f} %, 2 sd {100 * np.mean(t < 2):.0f} %")
+    print(
+        f"depth (≥ 5 mm): median error {100 * np.median(np.abs(relative)):.1f} %, "
+        f"bias {100 * np.mean(relative):.1f} % (median {100 * np.median(relative):.1f} %), "
+        f"within 1 sd {100 * np.mean(t < 1):.0f} %, 2 sd {100 * np.mean(t < 2):.0f} %"
+    )
     deep = e[e[:, 0] >= 0.008]
     rel = deep[:, 2] / deep[:, 0] - 1
-    print(f"depth (≥ 8 mm): median error {100 * np.median(np.abs(rel)):.1f} %, bias {100 * np.mean(rel):.1f} %")
+    print(
+        f"depth (≥ 8 mm): median error {100 * np.median(np.abs(rel)):.1f} %, "
+        f"bias {100 * np.mean(rel):.1f} %"
+    )
     for k, name in ((4, "length"), (5, "width")):
         off = some[:, k] - 1
-        print(f"{name}: median error {100 * np.median(np.abs(off)):.1f} %, bias {100 * np.median(off):.1f} %")
-    print(f"peak: median {100 * np.median(some[:, 6]):.1f} cm, 95 % {100 * np.quantile(some[:, 6], 0.95):.1f} cm")
+        print(
+            f"{name}: median error {100 * np.median(np.abs(off)):.1f} %, "
+            f"bias {100 * np.median(off):.1f} %"
+        )
+    print(
+        f"peak: median {100 * np.median(some[:, 6]):.1f} cm, "
+        f"95 % {100 * np.quantile(some[:, 6], 0.95):.1f} cm"
+    )
     tally.clean(seed, n)
     print(f"{len(tally.false_alarms)} false alarms; clean length {tally.clean_length:.0f} m")
     print(*tally.false_alarms, sep="\n")
     ovality(seed, n // 2)
     bow(seed, n // 4)
-    print(f"seconds per pipe: median {np.median(tally.seconds):.2f}, worst {max(tally.seconds):.2f}")
+    print(
+        f"seconds per pipe: median {np.median(tally.seconds):.2f}, worst {max(tally.seconds):.2f}"
+    )
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 100, int(sys.argv[2]) if len(sys.argv) > 2 else 1)
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 100, int(sys.argv[2]) if len(sys.argv) > 2 else 1
+    )

@@ -67,8 +67,13 @@ class Contour:
     @property
     def term_covariance(self) -> Array:
         """Covariance of the coefficients at every row, shape (rows, terms, terms)."""
-        half = np.einsum("ra,akbl->rkbl", self.basis, self.covariance, optimize=True)
-        return np.asarray(np.einsum("rkbl,rb->rkl", half, self.basis, optimize=True))
+        n = self.n_terms
+        result = np.empty((len(self.basis), n, n))
+        for k in range(n):
+            for m in range(n):
+                half = self.basis @ self.covariance[:, k, :, m]
+                result[:, k, m] = np.sum(half * self.basis, axis=1)
+        return result
 
     @property
     def height(self) -> Array:
@@ -79,7 +84,8 @@ class Contour:
     def sd(self) -> Array:
         """Standard deviation of `height` per cell, metres."""
         phi = harmonics(self.grid.clocks, self.n_terms)
-        variance = np.einsum("rkl,ck,cl->rc", self.term_covariance, phi, phi, optimize=True)
+        pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
+        variance = self.term_covariance.reshape(len(self.basis), -1) @ pairs.T
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
@@ -127,6 +133,7 @@ def fit_contour(
     basis = spline_basis(grid, knot_diameters)
     n_splines = basis.shape[1]
     phi = harmonics(grid.clocks, n_terms)
+    pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
     prior = _prior_precision(grid, n_splines, n_terms, knot_diameters, constant_radius)
     used = np.isfinite(variance) & np.isfinite(height)
     used &= inner_rows(grid)[:, None]
@@ -135,9 +142,9 @@ def fit_contour(
 
     weight = base
     for loss in [*[_cauchy] * 6, *[_tukey] * 6, None]:
-        moments = np.einsum("rc,ck,cl->rkl", weight, phi, phi, optimize=True)
-        right = np.einsum("rc,ck->rk", weight * y, phi, optimize=True)
-        normal = np.einsum("ra,rkl,rb->akbl", basis, moments, basis, optimize=True) + prior
+        moments = (weight @ pairs).reshape(-1, n_terms, n_terms)
+        right = (weight * y) @ phi
+        normal = _normal_matrix(basis, moments) + prior
         size = n_splines * n_terms
         factor = cho_factor(normal.reshape(size, size))
         solution = cho_solve(factor, (basis.T @ right).ravel()).reshape(n_splines, n_terms)
@@ -148,6 +155,17 @@ def fit_contour(
         weight = base * loss(residual / max(spread, 1.0))
     covariance = cho_solve(factor, np.eye(size)).reshape(n_splines, n_terms, n_splines, n_terms)
     return Contour(grid, basis, solution, covariance)
+
+
+def _normal_matrix(basis: Array, moments: Array) -> Array:
+    """Σ over rows of splines ⊗ splines ⊗ moments, shape (splines, terms, splines, terms)."""
+    n_splines, n_terms = basis.shape[1], moments.shape[1]
+    normal = np.empty((n_splines, n_terms, n_splines, n_terms))
+    # One product of matrices per pair of terms is far quicker than one einsum over all.
+    for k in range(n_terms):
+        for m in range(n_terms):
+            normal[:, k, :, m] = basis.T @ (moments[:, k, m, None] * basis)
+    return normal
 
 
 def _cauchy(residual: Array) -> Array:
