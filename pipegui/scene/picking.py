@@ -1,11 +1,14 @@
 """Which point is under the cursor: points are projected one by one, the nearest wins."""
 
 import math
+from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipecore.geometry import Array
 from pipegui.scene.projection import Projection
 
 PICK_RADIUS_PX = 6.0
@@ -14,17 +17,13 @@ LAYER_PX = 10.0
 
 
 @njit(cache=True, nogil=True)
-def points_near(xyz, matrix, cursor, radius):  # pragma: no cover
-    """Rows, depths and distances in pixels of the points within `radius` of `cursor`.
+def _find_near(xyz, matrix, cursor, radius, rows, depths, distances):  # pragma: no cover
+    """Fill the three arrays with the points within `radius` of `cursor`; return their number.
 
-    `xyz` has shape (n, 3); `matrix` is that of a `Projection`; `cursor` and `radius` are
-    in pixels. Serial on purpose: numba's plain threading layer dies when two threads
-    of ours use it, and five million points take 30 ms this way.
+    Points for which there is no room are counted only. Serial on purpose: numba's plain
+    threading layer dies when two of our threads use it.
     """
     n_found = 0
-    rows = np.empty(64, np.int64)
-    depths = np.empty(64)
-    distances = np.empty(64)
     for i in range(xyz.shape[0]):
         px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         w = matrix[3, 0] * px + matrix[3, 1] * py + matrix[3, 2] * pz + matrix[3, 3]
@@ -40,15 +39,37 @@ def points_near(xyz, matrix, cursor, radius):  # pragma: no cover
         depth = matrix[2, 0] * px + matrix[2, 1] * py + matrix[2, 2] * pz + matrix[2, 3]
         if distance > radius or depth <= 0.0:
             continue
-        if n_found == len(rows):
-            rows = np.concatenate((rows, np.empty(n_found, np.int64)))
-            depths = np.concatenate((depths, np.empty(n_found)))
-            distances = np.concatenate((distances, np.empty(n_found)))
-        rows[n_found] = i
-        depths[n_found] = depth
-        distances[n_found] = distance
+        if n_found < len(rows):
+            rows[n_found] = i
+            depths[n_found] = depth
+            distances[n_found] = distance
         n_found += 1
-    return rows[:n_found], depths[:n_found], distances[:n_found]
+    return n_found
+
+
+def points_near(
+    xyz: NDArray[np.floating],
+    projection: Projection,
+    cursor: tuple[float, float],
+    radius: float,
+    kernel: Callable[..., int] = _find_near,
+) -> tuple[NDArray[np.int64], Array, Array]:
+    """Return rows, depths (metres) and distances (pixels) of the points near `cursor`."""
+    room = 1024
+    while True:
+        rows, depths, distances = np.empty(room, np.int64), np.empty(room), np.empty(room)
+        at = np.array(cursor, np.float64)
+        n_found = kernel(xyz, projection.matrix, at, float(radius), rows, depths, distances)
+        if n_found <= room:
+            return rows[:n_found], depths[:n_found], distances[:n_found]
+        room = n_found
+
+
+@cache
+def warm_up() -> None:
+    """Compile the kernel, or load it: seconds that the first hover should not take."""
+    projection = Projection(np.eye(4), 1.0, 0.0)
+    points_near(np.zeros((1, 3), np.float32), projection, (0.0, 0.0), 1.0)
 
 
 def pick_point(
@@ -66,9 +87,7 @@ def pick_point(
     cursor : tuple of float
         Pixels from the left and from the top.
     """
-    rows, depths, distances = points_near(
-        xyz, projection.matrix, np.array(cursor, np.float64), PICK_RADIUS_PX
-    )
+    rows, depths, distances = points_near(xyz, projection, cursor, PICK_RADIUS_PX)
     if not len(rows):
         return -1
     front = depths.min()

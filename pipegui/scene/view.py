@@ -1,6 +1,7 @@
 """The 3D view: takes a `SceneState`, shows it, and says what the user points at."""
 
 import math
+import threading
 
 import numpy as np
 from PySide6.QtCore import QPointF, QTimer, Signal
@@ -19,7 +20,7 @@ from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.decorations import Decorations
 from pipegui.scene.legend import make_legend
 from pipegui.scene.overlay import Label, Overlay
-from pipegui.scene.picking import pick_point
+from pipegui.scene.picking import pick_point, warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
 from pipegui.view_state import SceneState
@@ -63,6 +64,8 @@ class SceneView(QWidget):
         self.canvas.before_frame.connect(self._prepare_frame)
         self.canvas.drawn.connect(self.points.learn)
         self.setAccessibleName("3D view")
+        self._warming = threading.Thread(target=warm_up, name="warm up picking", daemon=True)
+        self._warming.start()
 
     # States
 
@@ -230,6 +233,7 @@ class SceneView(QWidget):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Let go of VTK while its context is there."""
+        self._warming.join()
         self._hover_timer.stop()
         self._decorations.clear()
         self.points.clear_actors()

@@ -12,7 +12,7 @@ from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.aiming import aim
 from pipegui.scene.overlay import length_text, place_box, round_length
-from pipegui.scene.picking import PICK_RADIUS_PX, pick_point, points_near
+from pipegui.scene.picking import PICK_RADIUS_PX, _find_near, pick_point, points_near
 from pipegui.scene.point_layer import estimate_spacing
 from pipegui.scene.pose import VIEW_ANGLE, Pose
 from pipegui.scene.projection import Projection, as_array
@@ -131,18 +131,20 @@ def test_that_the_kernel_finds_the_same_points_as_its_plain_twin(pose, rng):
     xyz[:200] = pose.position - rng.uniform(0, 1, (200, 1)) * pose.forward  # behind
     projection = projection_of(pose)
     for cursor in rng.uniform(0, SIZE, (20, 2)):
-        rows, depths, distances = points_near(xyz, projection.matrix, cursor, PICK_RADIUS_PX)
+        rows, depths, distances = points_near(xyz, projection, cursor, PICK_RADIUS_PX)
         assert rows.tolist() == pick_twin(xyz, projection, cursor).tolist()
         pixels, depth = projection.to_screen(xyz[rows])
         assert depths == pytest.approx(depth)
         assert distances == pytest.approx(np.linalg.norm(pixels - cursor, axis=1))
 
 
-def test_that_the_kernel_runs_the_same_as_plain_python(pose, rng):
-    xyz = pose.focus + rng.uniform(-0.1, 0.1, (300, 3))
-    args = xyz, projection_of(pose).matrix, np.array([400.0, 300.0]), 40.0
-    for fast, plain in zip(points_near(*args), points_near.py_func(*args), strict=True):
-        assert fast == pytest.approx(plain)
+def test_that_the_kernel_runs_the_same_compiled_and_plain(pose, rng):
+    xyz = pose.focus + rng.uniform(-0.1, 0.1, (2000, 3))
+    args = xyz, projection_of(pose), (400.0, 300.0), 80.0
+    compiled, plain = points_near(*args), points_near(*args, kernel=_find_near.py_func)
+    assert len(plain[0]) > 1024  # more than there is room for at first
+    for fast, slow in zip(compiled, plain, strict=True):
+        assert fast == pytest.approx(slow)
 
 
 def test_that_the_front_surface_is_picked_and_on_it_the_nearest_to_the_cursor(pose, rng):
