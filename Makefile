@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui format lock venv system-packages clean
+.PHONY: help demo test lint test-core test-kernels test-gui study bench format lock venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -39,6 +39,12 @@ test-kernels: venv
 
 test-gui: venv
 	$(WINDOWED) $(PYTHON) -m pytest tests/gui
+
+study: venv ## Measure the accuracy on simulated scans (half an hour; writes docs/accuracy.md)
+	$(PYTHON) -m tests.study
+
+bench: venv ## Measure time and memory (writes docs/performance.md)
+	$(PYTHON) -m tests.bench
 
 format: venv ## Lay out the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix
