@@ -138,4 +138,6 @@ def _set_default_sizes(window: "MainWindow") -> None:
     window.resizeDocks([docks["Deformations"]], [max(190, height * 22 // 100)], down)
     halves = [height * 55 // 100, height * 45 // 100]
     window.resizeDocks([docks["Project"], docks["Stacks"]], halves, down)
-    window.resizeDocks([docks["Element"], docks["Properties"]], halves, down)
+    # Plots need the height more than a list does.
+    plots = [height * 65 // 100, height * 35 // 100]
+    window.resizeDocks([docks["Element"], docks["Properties"]], plots, down)

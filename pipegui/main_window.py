@@ -44,6 +44,9 @@ class MainWindow(QMainWindow):
         self.setWindowTitle("PipeGUI")
         self.setAcceptDrops(True)
         self.parts, self.jobs, self.stored = parts, jobs, stored
+        # Qt's connections hold on to the window in a way that Python does not see: they
+        # go with the jobs, and the jobs with the window.
+        jobs.setParent(self)
         self.history = History(changed=self._show)
         self._state = ViewState()
         self.panels = Panels.make()

@@ -4,11 +4,13 @@ import sys
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtGui import QImage
 
 from pipegui.main_window import MainWindow
 
-SETTLING_MS = 1500
-"""The camera's flight and the plots' first drawing, with plenty to spare without a GPU."""
+LOOK_AGAIN_MS = 700
+PATIENCE = 40
+"""Looks after which the picture is taken as it is."""
 
 
 class Screenshot(QObject):
@@ -21,11 +23,22 @@ class Screenshot(QObject):
         super().__init__(window)
         self._window, self._path = window, path
         window.jobs.scan_read.connect(lambda _: window.detect())
-        window.jobs.detected.connect(lambda *_: QTimer.singleShot(SETTLING_MS, self._save))
+        window.jobs.detected.connect(lambda *_: self._look_again())
         window.jobs.failed.connect(self._fail)
+        self._last: QImage | None = None
+        self._n_looks = 0
 
-    def _save(self) -> None:
-        if not self._window.grab().save(str(self._path)):
+    def _look_again(self) -> None:
+        QTimer.singleShot(LOOK_AGAIN_MS, self, self._look)
+
+    def _look(self) -> None:
+        """Save the picture once it does not change any more: camera at rest, all drawn."""
+        picture = self._window.grab().toImage()
+        self._n_looks += 1
+        if picture != self._last and self._n_looks < PATIENCE:
+            self._last = picture
+            self._look_again()
+        elif not picture.save(str(self._path)):
             self._fail(f"The picture could not be written to {self._path}.")
         else:
             self.ended.emit(0)

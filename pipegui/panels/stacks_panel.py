@@ -1,6 +1,7 @@
 """The stacks panel: in which directions profiles are cut, and which stack is shown."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from PySide6.QtCore import QSize, Qt, Signal
@@ -30,6 +31,7 @@ PRESET_TEXT = {
     DirectionPreset.NONE: "Only my own",
 }
 NAME, WIDTH, PROFILES = range(3)
+CHECKED = Qt.CheckState.Checked
 OWN_INDEX = Qt.ItemDataRole.UserRole
 STACK_ID = int(Qt.ItemDataRole.UserRole) + 1
 SAME_DIRECTION = np.cos(np.deg2rad(0.1))
@@ -82,7 +84,8 @@ class StacksPanel(QWidget):
         self._edited: int | None = None
         self._empty = EmptyHint("The stacks of profiles appear here once a scan has been detected.")
         self._lay_out()
-        self.apply(StacksState())
+        self._state = StacksState()
+        self._list(self._state)
 
     def _button(self, icon: str, tip: str, act: Callable[[], None]) -> QToolButton:
         button = QToolButton()
@@ -113,6 +116,23 @@ class StacksPanel(QWidget):
 
     def apply(self, state: StacksState) -> None:
         """Show a state."""
+        before, self._state = self._state, state
+        if replace(state, shown_stack=before.shown_stack) == before:
+            # A tick is answered in place: its item must outlive the signal that it sends.
+            self._show_ticks(state.shown_stack)
+        else:
+            self._list(state)
+
+    def _show_ticks(self, shown_stack: int) -> None:
+        with self._applying:
+            for row in range(self.list.topLevelItemCount()):
+                item = self.list.topLevelItem(row)
+                stack_id = item.data(NAME, STACK_ID)
+                if stack_id is not None:
+                    ticked = stack_id == shown_stack
+                    item.setCheckState(NAME, CHECKED if ticked else Qt.CheckState.Unchecked)
+
+    def _list(self, state: StacksState) -> None:
         with self._applying:
             self.preset.setCurrentIndex(self.preset.findData(state.settings.preset))
             selected = self._own_index()
@@ -142,7 +162,7 @@ class StacksPanel(QWidget):
         item.setText(WIDTH, f"{1000 * stack.width:.0f} mm")
         item.setText(PROFILES, f"{n_profiles:,}")
         item.setTextAlignment(PROFILES, Qt.AlignmentFlag.AlignRight)
-        item.setCheckState(NAME, Qt.CheckState.Checked if is_shown else Qt.CheckState.Unchecked)
+        item.setCheckState(NAME, CHECKED if is_shown else Qt.CheckState.Unchecked)
         item.setData(NAME, STACK_ID, stack.stack_id)
         item.setData(NAME, OWN_INDEX, own)
         direction = ", ".join(f"{c:.3f}" for c in stack.direction)
@@ -180,7 +200,7 @@ class StacksPanel(QWidget):
     def _tell_shown(self, item: QTreeWidgetItem, column: int) -> None:
         if self._applying or column != NAME:
             return
-        is_checked = item.checkState(NAME) == Qt.CheckState.Checked
+        is_checked = item.checkState(NAME) == CHECKED
         self.shown.emit(item.data(NAME, STACK_ID) if is_checked else NO_ID)
 
     def add(self) -> None:

@@ -30,7 +30,7 @@ def _flush() -> None:
     for _ in range(3):
         QCoreApplication.processEvents()
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-    gc.collect()
+        gc.collect()
 
 
 def _top_level(app: QApplication) -> dict[int, str]:
@@ -59,6 +59,7 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
     windows = _top_level(app)
     threads, render_windows = set(threading.enumerate()), _render_windows()
     yield
+    request.node.funcargs.clear()  # pytest's own references to what the fixtures made
     _flush()
     left = [window for address, window in _top_level(app).items() if address not in windows]
     running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]

@@ -1,0 +1,115 @@
+"""The whole window with its real 3D view and plots: a surveyor's first five minutes."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+
+from pipegui.document import ColourBy, Selection
+from pipegui.parts import make_parts
+from tests.factories import make_cloud, make_result
+
+LEFT = Qt.MouseButton.LeftButton
+MANY = 60_000
+
+
+@pytest.fixture
+def real_window(make_window):
+    cloud, result = make_cloud(MANY), make_result(MANY)
+    window = make_window(
+        read=lambda *_: cloud, detect=lambda *_: replace(result), parts=make_parts()
+    )
+    # A flight takes its time on a machine without a GPU.
+    window.actions_["fly"].setChecked(False)
+    return window
+
+
+def wait_until_drawn(window, qtbot):
+    """Wait until two looks at the 3D view see the same."""
+    looks = [window.parts.scene.screenshot()]
+
+    def is_still():
+        looks.append(window.parts.scene.screenshot())
+        return looks[-1] == looks[-2]
+
+    qtbot.waitUntil(is_still, timeout=20_000)
+    return looks[-1]
+
+
+def pixels(image):
+    image = image.convertToFormat(image.Format.Format_RGB32)
+    flat = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1, 4)
+    return flat[:, : image.width(), :3].astype(int)
+
+
+def test_that_a_window_without_a_scan_opens_and_closes(real_window):
+    assert real_window.panels.welcome.isVisible()
+
+
+def test_that_open_detect_click_plot_and_table_show_one_thing(real_window, qtbot):
+    window, scene = real_window, real_window.parts.scene
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    opened = pixels(wait_until_drawn(window, qtbot))
+    assert len(np.unique(opened.reshape(-1, 3), axis=0)) > 50, "the cloud is drawn"
+
+    window.detect()
+    qtbot.waitUntil(lambda: window.document.result is not None)
+    window.panels.message.hide()
+    qtbot.waitUntil(lambda: scene.height() == len(opened))
+    detected = pixels(wait_until_drawn(window, qtbot))
+    assert (np.abs(detected - opened).max(axis=2) > 20).mean() > 0.05, "coloured by deviation"
+    assert window.document.selection.deformation_id == 1
+
+    # Nothing selected; then a click where the dent is looked at takes its pipe.
+    for _ in range(3):
+        qtbot.keyClick(window, Qt.Key.Key_Escape)
+    assert window.document.selection == Selection()
+    wait_until_drawn(window, qtbot)
+    index = make_result(MANY).element_id == 2
+    near = (
+        np.linalg.norm(make_cloud(MANY).xyz - make_result(MANY).deformation(1).peak, axis=1) < 0.15
+    )
+    place = next(
+        QPoint(x, y)
+        for x in range(scene.width() // 2 - 90, scene.width() // 2 + 90, 6)
+        for y in range(scene.height() // 2 - 90, scene.height() // 2 + 90, 6)
+        if (hit := scene.pick(QPoint(x, y).toPointF())) >= 0 and index[hit] and near[hit]
+    )
+    qtbot.mouseClick(scene.canvas, LEFT, pos=place)
+    qtbot.waitUntil(lambda: window.document.selection.element_id == 2)
+    assert window.panels.docks["Element"].windowTitle() == "Pipe 2"
+
+    # A row of the table takes camera, plot and tree to its deformation.
+    before = pixels(wait_until_drawn(window, qtbot))
+    view = window.panels.table.view
+    row = window.panels.table.proxy.index(1, 3)
+    qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(row).center())
+    assert window.document.selection.deformation_id == 3
+    after = pixels(wait_until_drawn(window, qtbot))
+    assert (np.abs(after - before).max(axis=2) > 20).mean() > 0.05, "the camera went there"
+    assert window.panels.tree.model.what(window.panels.tree.view.currentIndex())[2] == 3
+
+
+def test_that_colours_stacks_and_hiding_change_the_picture_and_undo_brings_it_back(
+    real_window, qtbot
+):
+    window = real_window
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    qtbot.waitUntil(lambda: window.document.result is not None)
+    for _ in range(3):
+        qtbot.keyClick(window, Qt.Key.Key_Escape)
+    qtbot.keyClick(window, Qt.Key.Key_F)
+    first = pixels(wait_until_drawn(window, qtbot))
+    window.panels.tree.visibility_changed.emit((7,), True)
+    hidden = pixels(wait_until_drawn(window, qtbot))
+    assert (first != hidden).any(axis=2).mean() > 0.01
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert (pixels(wait_until_drawn(window, qtbot)) == first).all(axis=2).mean() > 0.999
+    window.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
+    assert window.document.view.colour_by is ColourBy.PROFILE
+    assert (first != pixels(wait_until_drawn(window, qtbot))).any(axis=2).mean() > 0.01
