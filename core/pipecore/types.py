@@ -132,7 +132,7 @@ class Element:
     ovality, ovality_sd : float
         (Dmax - Dmin) / Dnom as a ratio; nan where the arc cannot carry it.
     straightness : float
-        Largest distance of the measured axis from the fitted one, metres.
+        Largest distance of the measured axis from the chord of its ends, metres.
     nominal : NominalSize, optional
         The catalogue size within tolerance, if any.
     gaps : tuple of (float, float)
@@ -204,7 +204,8 @@ class Profiles:
     normal, major_direction : ndarray, shape (m, 3)
         Unit normal of the profile's plane; unit vector along the major axis, in the plane.
     semi_minor, semi_major : ndarray, shape (m,)
-        Of the ellipse fitted freely where the arc carries it, else of the constrained one.
+        Of the ellipse fitted freely where the arc carries it, else of the constrained one:
+        about the element's axis in its own stack, along the points' axis in the others.
     radius, radius_sd : ndarray, shape (m,)
         Of the circle seen along the axis, and its standard deviation.
     ovality : ndarray, shape (m,)

@@ -1,11 +1,13 @@
 """Straights that follow each other with hardly a turn are one pipe, bowed or kinked."""
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pipecore.elements.extent import Extent
+from pipecore.elements.extent import SHOWN_GAP, Extent
 from pipecore.elements.refine import Fitted
 from pipecore.elements.runs import Span, meeting_ends
 from pipecore.elements.surfaces import LineSurface, SurfaceFit
@@ -15,7 +17,7 @@ Array = NDArray[np.float64]
 
 MAX_TURN_COS = float(np.cos(np.deg2rad(4.0)))
 """No elbow turns by less than this."""
-MAX_GAP = 3.0
+MAX_GAP = 12.0
 """Longest gap between the parts of one pipe, in radii."""
 SAME_RADIUS = 0.02
 
@@ -96,12 +98,17 @@ def _joined(parts: list[Fitted]) -> Fitted:
         sum(p.fit.n_used for p in parts),
     )
     covered = sum(p.extent.coverage * p.axis.length for p in parts)
+    ends = sorted(
+        tuple(sorted((float((q - middle) @ direction) - low) for q in (p.axis.start, p.axis.end)))
+        for p in parts
+    )
+    between = [(a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > SHOWN_GAP * radius]
     extent = Extent(
         0.0,
         high - low,
         float(np.median([p.extent.arc for p in parts])),
         min(1.0, covered / (high - low)),
-        (),
+        tuple(between),
     )
     return Fitted(
         fit,

@@ -17,7 +17,7 @@ MEET_RADII = 3.0
 """Ends meet within this many radii along the axis …"""
 MEET_OFFSET = 0.25
 """… and this share of a radius across it."""
-COLLINEAR_GAP = 8.0
+COLLINEAR_GAP = 12.0
 """Straight pipes on one line and of one radius follow each other across this many radii."""
 
 

@@ -41,8 +41,9 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
     Profiles
         One row per profile with at least eight points and a circle, `stack_id` is
         `OWN_STACK`. Semi-axes and ovality are those of the free direct ellipse where the
-        points cover 240° or more; on shorter arcs that fit collapses, so there the
-        ellipse is the circle and the ovality not measurable.
+        points cover 240° or more. On shorter arcs that fit collapses and even a free
+        circle follows a dent outwards, so there the ellipse is the circle about the
+        element's axis, and the ovality not measurable.
     """
     axis = element.axis
     chainage, rho, clock = axis.pipe_coordinates(xyz)
@@ -70,8 +71,9 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
     n_points = np.diff(starts)
     radius, rms, arc = fits[:, 2], fits[:, 3], fits[:, 4]
     is_free = (arc >= FREE_FIT_ARC) & np.isfinite(free.semi_minor) & (n_points >= 12)
-    semi_minor = np.where(is_free, free.semi_minor, radius)
-    semi_major = np.where(is_free, free.semi_major, radius)
+    about_axis = np.add.reduceat(rho, starts[:-1]) / n_points
+    semi_minor = np.where(is_free, free.semi_minor, about_axis)
+    semi_major = np.where(is_free, free.semi_major, about_axis)
     angle = np.where(is_free, free.angle, 0.0)
 
     at = np.asarray((rows + 0.5) * width, np.float64)
