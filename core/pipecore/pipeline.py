@@ -58,9 +58,11 @@ def detect(
     CancelledError
         If `progress` raises it.
     SettingsError
-        If the acceptance rule of the settings cannot be read.
+        If the acceptance rule of the settings cannot be read, or they ask for no stacks.
     """
     rule = load_rule(settings.deformation.rule)
+    if len(cloud) == 0:
+        return _nothing_found(cloud, settings)
     seconds: dict[str, float] = {}
     max_radius = settings.elements.max_radius_mm / 1e3
     with _timed(seconds, "surface"):
@@ -107,6 +109,24 @@ def detect(
         element_id=measured.element_id,
         deviation=measured.deviation,
         seconds=seconds,
+    )
+
+
+def _nothing_found(cloud: PointCloud, settings: Settings) -> Result:
+    """The result for a cloud without points."""
+    return Result(
+        settings=settings,
+        origin=cloud.origin,
+        source=cloud.source,
+        n_cloud_points=0,
+        stacks=(),
+        elements=(),
+        profiles=Profiles.empty(),
+        deformations=(),
+        segment_id=np.empty(0, np.int32),
+        element_id=np.empty(0, np.int32),
+        deviation=np.empty(0, np.float32),
+        seconds={},
     )
 
 

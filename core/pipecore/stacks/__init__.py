@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pipecore.errors import SettingsError
 from pipecore.geometry import unit
 from pipecore.progress import Progress
 from pipecore.settings import DirectionPreset, StackSettings
@@ -30,7 +31,13 @@ def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
 def choose_stacks(
     surface: Surface, settings: StackSettings, progress: Progress
 ) -> tuple[Stack, ...]:
-    """Return the stacks that the settings ask for: the preset's, then the user's own."""
+    """Return the stacks that the settings ask for: the preset's, then the user's own.
+
+    Raises
+    ------
+    SettingsError
+        If they ask for none.
+    """
     width = settings.width_mm / 1e3 or WIDTH * surface.voxel
     named: list[tuple[str, ArrayLike, float]] = []
     if settings.preset is DirectionPreset.AUTOMATIC:
@@ -41,6 +48,10 @@ def choose_stacks(
     for x, y, z, *own_width in settings.directions:
         own = own_width[0] / 1e3 if own_width and own_width[0] else width
         named.append((describe_direction((x, y, z)), (x, y, z), own))
+    if not named:
+        raise SettingsError(
+            "There are no stacks to cut; choose directions other than “none” or give your own."
+        )
     return tuple(
         Stack(i, unit(direction), stack_width, 0.0, name)
         for i, (name, direction, stack_width) in enumerate(named, start=1)
