@@ -23,9 +23,10 @@ from tests.core.shapes import (
 )
 
 R = 0.09
+ALL = EllipseSettings()
 
 
-def ellipses_of(surface: Surface, direction, settings=EllipseSettings(), width=0.02) -> Ellipses:
+def ellipses_of(surface: Surface, direction, settings=ALL, width=0.02) -> Ellipses:
     stack = Stack(1, unit(direction), width)
     curves = segment_profiles(surface, stack, ProfileSettings(), max_radius=5.0)
     return fit_ellipses(curves, surface, settings, ElementSettings(), NoProgress())

@@ -1,0 +1,151 @@
+"""Surfaces: derivatives against differences, fits against the truth and their own claims."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipecore.elements.surfaces import (
+    ArcSurface,
+    LineSurface,
+    SphereSurface,
+    fit_surface,
+    robust_sigma,
+)
+from pipecore.geometry import ArcAxis, LineAxis
+from tests.core.shapes import ball, random_direction, random_rotation, tube
+
+KINDS = ["cylinder", "cone", "torus", "sphere"]
+NOISE = 0.002
+N_TRIALS = 150
+
+
+def surface_of(rng, kind):
+    """A model and a sampler of points on it: half a turn around, as one station sees it."""
+    start, d = rng.uniform(-2, 2, 3), random_direction(rng)
+    clock = rng.uniform(0, 6)
+    if kind in ("cylinder", "cone"):
+        slope = 0.15 if kind == "cone" else 0.0
+        axis = LineAxis(start, d, 0.6)
+        model = LineSurface(axis.at(0.3), d, 0.1 + 0.3 * slope, slope, is_tapered=bool(slope))
+
+        def sample(noise):
+            return tube(
+                rng, axis, 0.1, radius_end=0.1 + 0.6 * slope, spacing=0.02, noise=noise,
+                arc=np.pi, middle_clock=clock,
+            )  # fmt: skip
+
+    elif kind == "torus":
+        q = random_rotation(rng)
+        bend = ArcAxis(start, q[2], q[0], 0.3, np.pi / 2)
+        model = ArcSurface(start, q[2], 0.3, 0.1)
+
+        def sample(noise):
+            return tube(rng, bend, 0.1, spacing=0.02, noise=noise, arc=np.pi, middle_clock=clock)
+
+    else:
+        model = SphereSurface(start, 0.15)
+
+        def sample(noise):
+            xyz, normals = ball(rng, start, 0.15, 0.02, noise)
+            seen = normals @ d > 0
+            return xyz[seen], normals[seen]
+
+    return model, sample
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_that_derivatives_are_those_of_differences(rng, kind):
+    model, sample = surface_of(rng, kind)
+    xyz, _ = sample(0.02)
+    _, jacobian, _ = model.residuals(xyz)
+    # A cone's derivatives leave out how its slope tilts the distance, second order in it.
+    h = 1e-6
+    for k in range(jacobian.shape[1]):
+        step = np.zeros(jacobian.shape[1])
+        step[k] = h
+        ahead, behind = model.stepped(step), model.stepped(-step)
+        numeric = (ahead.residuals(xyz)[0] - behind.residuals(xyz)[0]) / (2 * h)
+        slack = 0.05 if kind == "cone" else 1e-6
+        assert_allclose(jacobian[:, k], numeric, atol=slack * max(1.0, np.abs(numeric).max()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_that_residuals_are_distances_and_outward_vectors_normals(rng, kind):
+    model, sample = surface_of(rng, kind)
+    xyz, normals = sample(0.0)
+    residual, _, outward = model.residuals(xyz)
+    assert_allclose(residual, 0.0, atol=1e-12)
+    assert_allclose(outward, normals, atol=1e-9)
+    off = np.where(np.arange(len(xyz)) % 2, 0.01, -0.02)
+    moved, _, _ = model.residuals(xyz + off[:, None] * normals)
+    assert_allclose(moved, off, atol=1e-9)
+
+
+def disturbed(rng, model):
+    """The model a little off in every parameter."""
+    n = model.residuals(np.zeros((1, 3)) + 10.0)[1].shape[1]
+    return model.stepped(0.006 * rng.uniform(-1, 1, n))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_that_exact_points_give_back_their_surface(rng, kind):
+    model, sample = surface_of(rng, kind)
+    xyz, _ = sample(0.0)
+    fit = fit_surface(disturbed(rng, model), xyz, 0.005)
+    assert fit is not None
+    assert_allclose(fit.model.residuals(xyz)[0], 0.0, atol=1e-6)
+    found, true = fit.model.radius, model.radius
+    if kind == "cone":
+        found = fit.model.radius_at(model.middle)
+    assert found == pytest.approx(true, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_that_the_radius_is_as_sure_as_it_is_said_to_be(rng, kind):
+    model, sample = surface_of(rng, kind)
+    off = []
+    for _ in range(N_TRIALS):
+        fit = fit_surface(model, sample(NOISE)[0], NOISE)
+        assert fit is not None
+        radius = fit.model.radius_at(model.middle) if kind == "cone" else fit.model.radius
+        off.append((radius - model.radius) / fit.radius_sd)
+        assert fit.sigma == pytest.approx(NOISE, rel=0.35)
+    # 68 % of normal errors are within one standard deviation. That share of 150 trials has
+    # a standard deviation of 3.8 %; four of those are allowed.
+    assert 0.53 < np.mean(np.abs(off) < 1) < 0.83
+    assert abs(np.mean(off)) < 4 / np.sqrt(N_TRIALS)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_that_a_tenth_of_strangers_does_not_move_the_surface(rng, kind):
+    model, sample = surface_of(rng, kind)
+    xyz, normals = sample(NOISE)
+    strangers = np.arange(len(xyz)) % 10 == 0
+    xyz[strangers] += (0.03 * normals)[strangers]
+    fit = fit_surface(model, xyz, 3 * NOISE)
+    assert fit is not None
+    radius = fit.model.radius_at(model.middle) if kind == "cone" else fit.model.radius
+    assert abs(radius - model.radius) < 5 * fit.radius_sd
+    assert fit.sigma < 1.6 * NOISE
+
+
+def test_that_points_which_carry_no_surface_give_none(rng):
+    cylinder = LineSurface(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.1)
+    few = np.array([[0.0, 0.1, 0.0], [0.1, 0.0, 0.1], [0.3, -0.1, 0.0]])
+    assert fit_surface(cylinder, few, 0.005) is None
+    # One straight line of points on a cylinder says nothing of its radius.
+    x = np.linspace(-0.3, 0.3, 60)
+    line = np.stack([x, 0.1 + 0 * x, 0 * x], axis=1)
+    assert fit_surface(cylinder, line, 0.005) is None
+    far = rng.uniform(5, 6, (100, 3))
+    assert fit_surface(cylinder, far, 0.005) is None
+    ring = 0.1 * np.stack([0 * x, np.cos(9 * x), np.sin(9 * x)], axis=1)
+    assert fit_surface(cylinder, ring, 0.005) is None
+    assert fit_surface(SphereSurface(np.zeros(3), 0.1), np.tile(few[:1], (50, 1)), 0.005) is None
+
+
+def test_that_the_robust_sigma_is_the_standard_deviation_of_normal_errors(rng):
+    errors = 0.003 * rng.normal(size=20_000)
+    assert robust_sigma(errors) == pytest.approx(0.003, rel=0.03)
+    errors[:1000] = 1.0
+    assert robust_sigma(errors) == pytest.approx(0.003, rel=0.1)
