@@ -18,6 +18,7 @@ SMALLEST_SHARE = 0.15
 
 OPEN = 0.35
 """Ratio of the axes of a circle as seen, from which it looks like one."""
+ASIDE = np.deg2rad(20)
 LOOK_ROUND = np.deg2rad(35)
 
 
@@ -86,7 +87,9 @@ def _aim_at_deformation(
     else:
         inside = element.axis.at(float(np.clip(deformation.chainage, 0, element.axis.length)))
     pose = poses.looking_along(pose, unit(inside - deformation.peak))
-    half = max(deformation.length, 3 * element.radius)
+    # A little from the side: depth shows where a pipe is not seen square on.
+    pose = replace(pose, heading=pose.heading + ASIDE)
+    half = max(1.5 * deformation.length, 6.0 * element.radius, 0.3)
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     return poses.framing(pose, inside + half / np.sqrt(3) * corners, aspect)
 

@@ -150,6 +150,7 @@ class Canvas(QVTKRenderWindowInteractor):
             self.move_to(pose)
             return
         self._flight_ends = (self.pose, pose)
+        self.is_moving = True
         self._flight.start()
 
     def _fly_on(self, share: float) -> None:

@@ -15,7 +15,8 @@ from pipegui.scene.colouring import effective, visible_elements
 from pipegui.scene.point_layer import point_actor
 from pipegui.view_state import SceneState
 
-MAX_HIGHLIGHTED = 400_000
+MAX_HIGHLIGHTED = {False: 400_000, True: 20_000}
+"""Points of the selected element that are drawn over the others, at rest and moving."""
 SURFACE_OPACITY = 0.35
 ACCENT_POINTS = {ColourBy.SEGMENT, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.RGB}
 """Colourings whose colours the selection may cover; others are measured values."""
@@ -30,7 +31,7 @@ class Decorations:
     def __init__(self, layers: list[vtkRenderer]) -> None:
         self._layers = layers
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
-        self._accented: vtkActor | None = None
+        self._accented: dict[bool, vtkActor] = {}
 
     def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
         """Show the decorations of `state` where they differ from `before`."""
@@ -49,14 +50,15 @@ class Decorations:
         if everything or state.profile is not before.profile:
             self._replace("profile", self._profile(state))
 
-    def set_point_size(self, pixels: float) -> None:
+    def prepare(self, *, moving: bool, point_px: float) -> None:
         """Draw the points of the selection a little larger than the others, over them."""
-        if self._accented is not None:
-            self._accented.GetProperty().SetPointSize(pixels + 1)
+        for is_for_moving, actor in self._accented.items():
+            actor.SetVisibility(is_for_moving == moving)
+            actor.GetProperty().SetPointSize(point_px + 1)
 
     def clear(self) -> None:
         """Take all away."""
-        self._accented = None
+        self._accented = {}
         for name in list(self._groups):
             self._replace(name, ())
 
@@ -94,7 +96,7 @@ class Decorations:
             yield 0, _lines(shapes.ellipse_lines(profiles), theme.colour("text"), 1.0, 0.8)
 
     def _highlight(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
-        self._accented = None
+        self._accented = {}
         element = selected_element(state)
         if element is None:
             return
@@ -102,11 +104,10 @@ class Decorations:
         colour_by = effective(state.view.colour_by, state.cloud, state.result)
         if colour_by in ACCENT_POINTS and state.view.show_points:
             rows = np.flatnonzero(state.result.element_id == element.element_id)
-            rows = rows[:: max(1, -(-len(rows) // MAX_HIGHLIGHTED))]
-            if len(rows):
-                actor = _points(state.cloud.xyz[rows], accent)
-                self._accented = actor
-                yield 0, actor
+            for moving, limit in MAX_HIGHLIGHTED.items() if len(rows) else ():
+                thinned = rows[:: -(-len(rows) // limit)]
+                self._accented[moving] = _points(state.cloud.xyz[thinned], accent)
+                yield 0, self._accented[moving]
         yield 1, _lines(shapes.axis_lines((element,)), accent, 2.5)
         yield 1, _lines(shapes.end_rings(element), accent, 2.0)
 

@@ -18,6 +18,7 @@ ICON = 16
 LEADER = 36
 SCALE_BAR_PX = 140
 TRIAD_PX = 30
+TRIAD_REACH = TRIAD_PX + 18
 SCALE_HEIGHT = 168
 SCALE_WIDTH = 14
 
@@ -92,13 +93,7 @@ class Overlay(QWidget):
             return
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(_paper(170))
-        corner = QRectF(SPACING, self.height() - 13 * SPACING, 32 * SPACING, 12 * SPACING)
-        painter.drawRoundedRect(corner, 4, 4)
-        taken = [corner]
-        self._draw_triad(painter, self._pose)
-        self._draw_scale_bar(painter, self._projection, self._pose)
+        taken = [self._draw_corner(painter, self._projection, self._pose)]
         if self.legend is not None:
             taken.append(self._draw_legend(painter, self.legend))
         self._draw_labels(painter, self._projection, taken)
@@ -202,9 +197,24 @@ class Overlay(QWidget):
 
     # Scale and directions
 
-    def _draw_triad(self, painter: QPainter, pose: Pose) -> None:
-        reach = TRIAD_PX + 16
-        middle = QPointF(SPACING + reach, self.height() - SPACING - reach)
+    def _draw_corner(self, painter: QPainter, projection: Projection, pose: Pose) -> QRectF:
+        """Draw directions and scale bar on one ground."""
+        pixel = projection.pixel_size(pose.distance)
+        metres = round_length(SCALE_BAR_PX * pixel)
+        length = metres / pixel
+        width = 2 * TRIAD_REACH + length + 4 * SPACING
+        height = 2 * TRIAD_REACH
+        corner = QRectF(SPACING, self.height() - height - SPACING, width, height)
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(_paper(170))
+        painter.drawRoundedRect(corner, 4, 4)
+        middle = QPointF(corner.left() + TRIAD_REACH, corner.center().y())
+        self._draw_triad(painter, middle, pose)
+        left = QPointF(corner.left() + 2 * TRIAD_REACH + 2 * SPACING, corner.bottom() - 2 * SPACING)
+        self._draw_scale_bar(painter, left, length, length_text(metres))
+        return corner
+
+    def _draw_triad(self, painter: QPainter, middle: QPointF, pose: Pose) -> None:
         names: list[QRectF] = []
         axes = zip(np.eye(3), "ENH", strict=True)
         for axis, name in sorted(axes, key=lambda a: a[0] @ pose.forward):
@@ -220,17 +230,14 @@ class Overlay(QWidget):
                 names.append(box)
                 painter.drawText(box, Qt.AlignmentFlag.AlignCenter, name)
 
-    def _draw_scale_bar(self, painter: QPainter, projection: Projection, pose: Pose) -> None:
-        pixel = projection.pixel_size(pose.distance)
-        metres = round_length(SCALE_BAR_PX * pixel)
-        length = metres / pixel
-        left = 2 * (TRIAD_PX + 16) + 3 * SPACING
-        y = self.height() - 2.5 * SPACING
+    def _draw_scale_bar(self, painter: QPainter, left: QPointF, length: float, text: str) -> None:
+        tick, right = QPointF(0, 4), left + QPointF(length, 0)
         painter.setPen(QPen(theme.colour("text"), 1.6))
-        for a, b in (((0, 0), (length, 0)), ((0, -4), (0, 4)), ((length, -4), (length, 4))):
-            painter.drawLine(QPointF(left + a[0], y + a[1]), QPointF(left + b[0], y + b[1]))
-        box = QRectF(left, y - 26, length, 20)
-        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, length_text(metres))
+        painter.drawLine(left, right)
+        for end in (left, right):
+            painter.drawLine(end - tick, end + tick)
+        box = QRectF(left.x() - SPACING, left.y() - 26, length + 2 * SPACING, 20)
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
 
 def _paper(alpha: int = 225) -> QColor:

@@ -81,7 +81,7 @@ class SceneView(QWidget):
         self._decorations.update(state, before, everything=is_new_theme or is_new_cloud)
         self._update_overlay(state)
         if is_new_cloud and state.scan_key != before.scan_key:
-            self.fit()
+            self.canvas.fly_to(self._fitted(self.canvas.pose), fly=False)
         elif state.selection != before.selection:
             self._aim(state)
         self.canvas.draw()
@@ -167,7 +167,7 @@ class SceneView(QWidget):
             pixel_size=projection.pixel_size(canvas.pose.distance),
             visible=self._state.view.show_points,
         )
-        self._decorations.set_point_size(self.points.point_px)
+        self._decorations.prepare(moving=canvas.is_moving, point_px=self.points.point_px)
         self.overlay.follow(projection, canvas.pose)
 
     # Mouse
