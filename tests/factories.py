@@ -335,6 +335,7 @@ def _profiles(element: Element, piece: _Piece, stack: Stack | None, seed: int) -
         major_direction=major,
         semi_minor=radius - second,
         semi_major=(radius + second) / cos_tilt,
+        semi_minor_sd=radius_sd,
         radius=radius,
         radius_sd=radius_sd,
         ovality=4 * second / (2 * element.radius)

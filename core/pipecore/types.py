@@ -206,8 +206,10 @@ class Profiles:
     semi_minor, semi_major : ndarray, shape (m,)
         Of the ellipse fitted freely where the arc carries it, else of the constrained one:
         about the element's axis in its own stack, along the points' axis in the others.
+    semi_minor_sd : ndarray, shape (m,)
+        Standard deviation of the semi-minor axis.
     radius, radius_sd : ndarray, shape (m,)
-        Of the circle seen along the axis, and its standard deviation.
+        Of the free circle seen along the axis, and its standard deviation.
     ovality : ndarray, shape (m,)
         (Dmax - Dmin) / Dnom of this profile as a ratio, nan where not measurable.
     centre_deviation, radius_deviation : ndarray, shape (m,)
@@ -229,6 +231,7 @@ class Profiles:
     major_direction: Array
     semi_minor: Array
     semi_major: Array
+    semi_minor_sd: Array
     radius: Array
     radius_sd: Array
     ovality: Array

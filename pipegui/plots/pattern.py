@@ -47,7 +47,7 @@ def pattern_of(element: Element, profiles: Profiles) -> Pattern:
     off = (values - fitted)[np.isfinite(values)]
     middle = float(np.median(off)) if len(off) else np.nan
     spread = 1.4826 * float(np.median(np.abs(off - middle))) if len(off) else np.nan
-    return Pattern(values, 1000 * profiles.radius_sd, fitted, fitted + middle, spread)
+    return Pattern(values, 1000 * profiles.semi_minor_sd, fitted, fitted + middle, spread)
 
 
 def index_at(chainage: Array | float, profiles: Profiles) -> Array:

@@ -20,6 +20,8 @@ from pipecore.types import OWN_STACK, Element, Profiles
 Array = NDArray[np.float64]
 
 MIN_POINTS = 8
+ELLIPSE_SD_FACTOR = 2.4
+"""Standard deviation of a free ellipse's axis at 240° of arc, in units of σ/√n."""
 
 
 def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float) -> Profiles:
@@ -89,6 +91,7 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
         major_direction=np.cos(angle)[:, None] * up + np.sin(angle)[:, None] * right,
         semi_minor=semi_minor,
         semi_major=semi_major,
+        semi_minor_sd=np.where(is_free, ELLIPSE_SD_FACTOR, 1.0) * rms / np.sqrt(n_points),
         radius=radius,
         radius_sd=rms * radius_sd_factor(arc) / np.sqrt(n_points),
         ovality=np.where(is_free, (semi_major - semi_minor) / nominal, np.nan),
@@ -144,6 +147,7 @@ def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Prof
             major_direction=e.major_direction,
             semi_minor=e.semi_minor,
             semi_major=e.semi_major,
+            semi_minor_sd=e.radius_sd,
             radius=e.radius,
             radius_sd=e.radius_sd,
             ovality=np.full(len(rows), np.nan),

@@ -88,17 +88,16 @@ def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result:
         *broken_at_gaps(profiles.chainage, 1000 * profiles.semi_minor),
         color=BLUE,
         lw=0.8,
-        label="semi-minor axis",
     )
     axes.errorbar(
         profiles.chainage,
-        1000 * profiles.radius,
-        yerr=1000 * np.nan_to_num(profiles.radius_sd),
+        1000 * profiles.semi_minor,
+        yerr=1000 * np.nan_to_num(profiles.semi_minor_sd),
         fmt=".",
         ms=2.5,
         color=INK,
         elinewidth=0.5,
-        label="radius ± sd",
+        label="semi-minor axis ± sd",
     )
     axes.set(xlabel="chainage (m)", title=f"{element.label}: radius (mm)")
     axes.legend(frameon=False, fontsize=7, ncols=3, handlelength=1.2, columnspacing=1.0)

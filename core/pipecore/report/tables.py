@@ -73,6 +73,7 @@ PROFILE_COLUMNS = (
     "rms_mm",
     "aic_line",
     "aic_ellipse",
+    "semi_minor_sd_mm",
 )
 
 DEFORMATION_COLUMNS = (
@@ -248,4 +249,5 @@ def _profile_columns(p: Profiles, place: FileCoordinates) -> list[list[str]]:
         column(p.rms, 1000, 3),
         column(p.aic_line, 1, 2),
         column(p.aic_ellipse, 1, 2),
+        column(p.semi_minor_sd, 1000, 3),
     ]
