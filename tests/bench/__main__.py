@@ -142,7 +142,8 @@ def _machine() -> str:
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "laspy"))
     return (
         f"{n_cores} cores ({platform.machine()}) with {memory:.0f} GB of memory, "
-        f"{platform.system()}, Python {platform.python_version()}, {libraries}"
+        f"{platform.system()}, load average {os.getloadavg()[0]:.1f} at the end, "
+        f"Python {platform.python_version()}, {libraries}"
     )
 
 

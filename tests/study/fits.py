@@ -106,6 +106,7 @@ def _figure(rows: dict[int, dict[str, Any]]) -> Figure:
     spread.set(ylabel="spread of the radius, mm", yscale="log", ylim=(0.2, 100))
     for axes in (bias, spread):
         axes.set(xlabel="arc, degrees", xticks=range(90, 361, 45))
+        axes.yaxis.set_major_formatter("{x:g}")
         axes.grid(alpha=0.3)
     spread.legend(fontsize=8)
     return figure
