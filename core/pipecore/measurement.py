@@ -60,7 +60,6 @@ def measure_elements(
             xyz,
             normals,
             neighbours_of(element, built.elements),
-            Profiles.empty(),
             settings,
         )
         own = index[finding.belongs]

@@ -56,7 +56,6 @@ class Tally:
             scan.xyz,
             scan.normals,
             scan.neighbours,
-            scan.profiles,
             DeformationSettings(),
         )
         self.seconds.append(time.perf_counter() - begin)

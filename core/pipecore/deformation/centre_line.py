@@ -20,7 +20,8 @@ class CentreLine:
     """How far the measured axis leaves its chord, at most.
 
     `chainage` and `clock` say where and to which side, `is_kink` whether it changes
-    direction there at once.
+    direction there at once. `explained` is the share of its variation (χ²) that a bow or
+    a kink explains: a place where something else was taken for the pipe is neither.
     """
 
     straightness: float
@@ -28,6 +29,7 @@ class CentreLine:
     chainage: float
     clock: float
     is_kink: bool
+    explained: float
 
 
 def measure_centre_line(contour: Contour) -> CentreLine:
@@ -45,11 +47,13 @@ def measure_centre_line(contour: Contour) -> CentreLine:
     variance = [float(side @ covariance[i] @ side) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
-    kink = _find_kink(s, deviation @ side, covariance, side)
-    if kink is not None:
+    shape = _shape_of(s, deviation @ side, covariance, side)
+    if shape.kink is not None:
         # The contour is smooth and rounds the corner; the two straight pieces do not.
-        return CentreLine(kink[1], float(sd), kink[0], clock, True)
-    return CentreLine(float(distance[peak]), float(sd), float(s[peak]), clock, False)
+        return CentreLine(shape.kink[1], float(sd), shape.kink[0], clock, True, shape.explained)
+    return CentreLine(
+        float(distance[peak]), float(sd), float(s[peak]), clock, False, shape.explained
+    )
 
 
 def _chord(s: Array, offset: Array) -> Array:
@@ -57,18 +61,24 @@ def _chord(s: Array, offset: Array) -> Array:
     return np.asarray(offset[0] * (1 - share) + offset[-1] * share)
 
 
-def _find_kink(
-    s: Array, lateral: Array, covariance: Array, side: Array
-) -> tuple[float, float] | None:
-    """Chainage and sag of a kink, if two straight pieces fit better than smooth bows.
+@dataclass(frozen=True)
+class _Shape:
+    """How much of the line's variation a bow or a kink explains, and the kink if it is one."""
 
-    These are a parabola and the line of a beam clamped at both ends, with as many
-    parameters as the two pieces.
+    explained: float
+    kink: tuple[float, float] | None
+
+
+def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shape:
+    """Compare the line of centres with smooth bows and with two straight pieces.
+
+    The bows are a parabola and the line of a beam clamped at both ends, with as many
+    parameters as the two pieces. The kink is given as chainage and sag.
     """
     step = max(1, len(s) // 40)
     s, lateral = s[::step], lateral[::step]
     if len(s) < 8:
-        return None
+        return _Shape(0.0, None)
     sd = np.sqrt(np.einsum("k,rkl,l->r", side, covariance[::step], side))
     x = (s - s[0]) / (s[-1] - s[0])
 
@@ -77,13 +87,15 @@ def _find_kink(
         solution, *_ = np.linalg.lstsq(design, lateral / sd, rcond=None)
         return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
 
+    straight, _ = chi2([np.ones_like(x), x])
     smooth, _ = chi2([np.ones_like(x), x, x**2, np.cos(2 * np.pi * x)])
     best, turn, where = np.inf, 0.0, 0.0
     for knee in x[2:-2]:
         value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
         if value < best:
             best, turn, where = value, abs(float(solution[2])), float(knee)
+    explained = 1.0 - min(best, smooth) / max(straight, 1e-300)
     length = float(s[-1] - s[0])
     if best + KINK_ADVANTAGE > smooth or turn / length < MIN_KINK:
-        return None
-    return float(s[0]) + where * length, turn * where * (1 - where)
+        return _Shape(explained, None)
+    return _Shape(explained, (float(s[0]) + where * length, turn * where * (1 - where)))

@@ -22,12 +22,18 @@ from pipecore.deformation.surface import Surface, own_surface
 from pipecore.deformation.unrolled import surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.settings import DeformationSettings
-from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind, Profiles
+from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind
 
 SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
 """Kinds whose contour is known well enough to look for deformations."""
 
 STRAIN_SIGNIFICANCE = 5.0
+
+MIN_BOW_LENGTH = 6.0
+"""In diameters: the line of a shorter stub hangs on what touches it."""
+
+MIN_EXPLAINED = 0.7
+"""A bent pipe is bent in one bow or kink, which explains this share of its line's variation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +70,6 @@ def find_deformations(
     xyz: Array,
     normals: Array,
     neighbours: Sequence[Element],
-    profiles: Profiles,
     settings: DeformationSettings,
 ) -> DeformationFinding:
     """Find and measure the deformations of one element.
@@ -77,8 +82,6 @@ def find_deformations(
         included, with unit normals of either sign, nan where not known.
     neighbours : sequence of Element
         Elements whose surfaces come near: where they touch, nothing is called a bulge.
-    profiles : Profiles
-        The element's own profiles.
     settings : DeformationSettings
     """
     points = unroll(element, xyz, normals)
@@ -269,6 +272,9 @@ def _measure_bow(
     if line.straightness_sd > settings.min_depth_mm / 1000:
         return np.nan, []
     if line.straightness < max(least, settings.significance * line.straightness_sd):
+        return line.straightness, []
+    is_short = grid.length < MIN_BOW_LENGTH * 2 * grid.radius
+    if is_short or line.explained < MIN_EXPLAINED:
         return line.straightness, []
     deformation = Deformation(
         deformation_id=NO_ID,

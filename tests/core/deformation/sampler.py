@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipecore.geometry import ArcAxis, Array, LineAxis, surface_points, unit
-from pipecore.types import Element, ElementKind, Profiles
+from pipecore.types import Element, ElementKind
 
 NAN3 = np.full(3, np.nan)
 Shape = Callable[[Array, Array], Array]
@@ -49,7 +49,6 @@ class PipeScan:
     normals: Array
     is_own: NDArray[np.bool_]
     neighbours: list[Element] = field(default_factory=list)
-    profiles: Profiles = field(default_factory=Profiles.empty)
 
 
 @dataclass

@@ -13,9 +13,7 @@ PATCHES = (DeformationKind.DENT, DeformationKind.BULGE)
 
 
 def find(scan: PipeScan, settings: DeformationSettings = SETTINGS):
-    return find_deformations(
-        scan.element, scan.xyz, scan.normals, scan.neighbours, scan.profiles, settings
-    )
+    return find_deformations(scan.element, scan.xyz, scan.normals, scan.neighbours, settings)
 
 
 def dented(height=-0.01, radius=0.11, size=0.11, clock=0.2, **scene) -> PipeScene:
