@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 
 from pipecore.geometry import LineAxis
 from pipecore.progress import NoProgress
@@ -55,10 +56,10 @@ def test_that_far_coordinates_cost_no_more_than_a_micrometre(rng):
     shift = np.array([320.0, -640.0, 64.0])
     near = thin(PointCloud(np.zeros(3), xyz), ThinningSettings(10.0), NoProgress())
     far = thin(PointCloud(np.zeros(3), xyz + shift), ThinningSettings(10.0), NoProgress())
-    if len(near.xyz) == len(far.xyz):
-        # Cubes count from the lowest point, so that the same points share one.
-        assert_allclose(far.xyz - shift, near.xyz, atol=2e-6)
-    assert abs(len(near.xyz) - len(far.xyz)) < 0.01 * len(near.xyz)
+    # Cubes count from the lowest point, so that the same points share one, but for those
+    # that rounding takes across a side.
+    off, _ = cKDTree(near.xyz).query(far.xyz - shift)
+    assert np.mean(off < 3e-6) > 0.95
 
 
 def test_that_the_automatic_voxel_is_the_spacing_of_the_scan(rng):
