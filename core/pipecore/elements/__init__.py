@@ -11,7 +11,7 @@ from pipecore.elements.joining import join_straights
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import LONG_PIECE, Piece, find_pieces
 from pipecore.elements.refine import Fitted, refine_piece
-from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
+from pipecore.elements.runs import Span, branches, meeting_ends, number_runs, trim_to_tangent
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.progress import Progress
@@ -78,6 +78,7 @@ def build_elements(
     for i, end_i, j, end_j in meeting_ends(spans):
         links.append((i, j))
         axes[i], axes[j] = _trimmed(axes[i], end_i, axes[j], end_j, fitted[i].fit.model.radius)
+    links += branches([Span(axis, f.radii) for axis, f in zip(axes, fitted, strict=True)])
     kinds = [_kind(f) for f in fitted]
     for i, j in flanges(fitted):
         kinds[i] = ElementKind.FLANGE

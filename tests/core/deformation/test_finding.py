@@ -79,7 +79,8 @@ def test_that_the_surface_of_a_touching_post_does_not_belong_beyond_the_contact(
     _, distance, _ = scan.element.axis.pipe_coordinates(scan.xyz)
     off = ~scan.is_own & (np.abs(distance - 0.15) > 0.02)
     assert np.count_nonzero(off) > 5
-    assert finding.belongs[off].mean() < 0.1
+    # Of few points one or two may still lie against the pipe.
+    assert np.count_nonzero(finding.belongs[off]) <= max(2, 0.1 * np.count_nonzero(off))
     assert finding.belongs[scan.is_own].mean() > 0.95
 
 
