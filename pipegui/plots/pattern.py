@@ -15,7 +15,7 @@ class Pattern:
     Parameters
     ----------
     values, sd : ndarray, shape (m,)
-        Semi-minor axes of the ellipses and the standard deviations of the radii.
+        Semi-minor axes of the ellipses and their standard deviations.
     fitted : ndarray, shape (m,)
         The element's radius there: constant, linear or a semicircle.
     moved : ndarray, shape (m,)

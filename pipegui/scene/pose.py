@@ -125,12 +125,16 @@ def framing(pose: Pose, points: Array, aspect: float, margin: float = 1.15) -> P
     """
     axes = np.stack([pose.right, pose.up, pose.forward])
     seen = points @ axes.T
-    middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
-    off = np.abs(seen - middle)
-    half_height = np.tan(VIEW_ANGLE / 2) / margin
-    needed = np.maximum(off[:, 1], off[:, 0] / aspect) / half_height - (seen - middle)[:, 2]
-    distance = max(float(needed.max()), 10 * MIN_DISTANCE)
-    return replace(pose, focus=middle @ axes, distance=distance)
+    # A point at depth d is in the picture if it is at most d · slope to the side: two planes
+    # through the camera for each side, and the camera is where those that touch meet.
+    slope = np.tan(VIEW_ANGLE / 2) / margin * np.array([aspect, 1.0])
+    low = (seen[:, :2] - slope * seen[:, 2:]).max(axis=0)
+    high = (seen[:, :2] + slope * seen[:, 2:]).min(axis=0)
+    across = (low + high) / 2
+    middle = (seen[:, 2].min() + seen[:, 2].max()) / 2
+    behind = float(((high - low) / (2 * slope)).min())
+    distance = max(middle - behind, 10 * MIN_DISTANCE)
+    return replace(pose, focus=np.append(across, middle) @ axes, distance=distance)
 
 
 def between(start: Pose, end: Pose, share: float) -> Pose:

@@ -98,10 +98,13 @@ def test_that_zooming_keeps_the_target_in_its_pixel(pose, rng):
 
 def test_that_framing_shows_all_points_and_fills_the_picture(pose, rng):
     points = rng.normal(0, [3, 0.5, 0.2], (200, 3))
-    pixels, _ = projection_of(poses.framing(pose, points, ASPECT)).to_screen(points)
-    assert (pixels >= 0).all()
-    assert (pixels <= SIZE).all()
-    assert max(np.ptp(pixels[:, 0]) / SIZE[0], np.ptp(pixels[:, 1]) / SIZE[1]) > 0.5
+    framed = poses.framing(pose, points, ASPECT, margin=1.25)
+    pixels, _ = projection_of(framed).to_screen(points)
+    # In one direction the points reach both edges of what the margin leaves.
+    reach = np.abs(pixels - np.array(SIZE) / 2).max(axis=0) / (np.array(SIZE) / 2)
+    assert reach.max() == pytest.approx(1 / 1.25, abs=1e-6)
+    edges = (pixels.max(axis=0) + pixels.min(axis=0))[np.argmax(reach)]
+    assert edges == pytest.approx(SIZE[np.argmax(reach)], abs=1e-6)
 
 
 def test_that_a_flight_starts_and_ends_where_it_should_and_turns_the_short_way(rng):
