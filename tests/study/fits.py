@@ -31,7 +31,7 @@ STYLES = {
 
 def write(quick: bool) -> str:
     """Measure and return the section's text."""
-    n = 30 if quick else 200
+    n = 30 if quick else 100
     name = f"fits-{n}"
     rows = {arc: measured(f"{name}-{arc}", lambda arc=arc: _errors(arc, n)) for arc in ARCS}
     image = put_image("fits", _figure(rows), "Error of the radius of one profile against its arc")

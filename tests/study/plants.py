@@ -48,9 +48,10 @@ def write(stations: int, first_seed: int, n: int) -> str:
         [_plant_line(r) for r in rows],
     )  # fmt: skip
     kinds = "; ".join(_kinds(rows))
+    few = f" These are few: at least {ENOUGH} are wanted." if n < ENOUGH else ""
     return f"""
 {n} random plants, seeds {seeds[0]} to {seeds[-1]}, {stations} station{"s" * (stations > 1)},
-2 mm noise, 1 cm spacing.
+2 mm noise, 1 cm spacing.{few}
 
 {summary}
 
@@ -126,6 +127,7 @@ def _targets(recall: float, radius: float) -> list[Target]:
 
 TARGETS = {4: _targets(0.98, 0.1), 1: _targets(0.97, 0.15)}
 WORST_RADIUS = "2 mm"
+ENOUGH = 20
 
 
 def _line(target: Target, rows: Rows) -> list[str]:
