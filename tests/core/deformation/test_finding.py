@@ -74,14 +74,18 @@ def test_that_own_points_belong_and_their_deviation_is_that_of_the_dent(rng):
 
 
 def test_that_the_surface_of_a_touching_post_does_not_belong_beyond_the_contact(rng):
-    scan = PipeScene(radius=0.15, length=2.0, post=True).scan(rng)
-    finding = find(scan)
-    _, distance, _ = scan.element.axis.pipe_coordinates(scan.xyz)
-    off = ~scan.is_own & (np.abs(distance - 0.15) > 0.02)
-    assert np.count_nonzero(off) > 5
-    # Of few points one or two may still lie against the pipe.
-    assert np.count_nonzero(finding.belongs[off]) <= max(2, 0.1 * np.count_nonzero(off))
-    assert finding.belongs[scan.is_own].mean() > 0.95
+    n_off = n_taken = 0
+    for _ in range(5):
+        scan = PipeScene(radius=0.15, length=2.0, post=True).scan(rng)
+        finding = find(scan)
+        _, distance, _ = scan.element.axis.pipe_coordinates(scan.xyz)
+        off = ~scan.is_own & (np.abs(distance - 0.15) > 0.02)
+        n_off += np.count_nonzero(off)
+        n_taken += np.count_nonzero(finding.belongs[off])
+        assert finding.belongs[scan.is_own].mean() > 0.95
+    # One scan shows a few dozen such points; a few of them lie against the pipe's side.
+    assert n_off > 25
+    assert n_taken < 0.15 * n_off
 
 
 def test_that_the_order_of_points_does_not_matter(rng):
