@@ -1,5 +1,6 @@
-"""Clouds of any size: simulated plants side by side."""
+"""Clouds of any size, plants side by side: `python -m tests.bench.clouds FILE MILLION`."""
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +14,11 @@ GAP = 2.0
 """Between two plants, metres."""
 
 
-def cloud_file(folder: Path, million: float) -> Path:
-    """The LAZ file of plants with together so many million points; kept once made.
+def write_cloud(path: Path, million: float) -> None:
+    """Write a LAZ file of plants with together so many million points.
 
     The last plant is cut off where the size is reached, across, so that its spacing stays.
     """
-    path = folder / f"plants-{million:g}.laz"
-    if path.exists():
-        return path
     wanted = round(1e6 * million)
     tiles: list[PointCloud] = []
     n_points, edge, seed = 0, 0.0, FIRST_SEED
@@ -41,4 +39,7 @@ def cloud_file(folder: Path, million: float) -> Path:
         np.concatenate([t.rgb for t in tiles if t.rgb is not None]),
     )
     write_laz(path, whole)
-    return path
+
+
+if __name__ == "__main__":
+    write_cloud(Path(sys.argv[1]), float(sys.argv[2]))
