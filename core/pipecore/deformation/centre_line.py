@@ -10,6 +10,9 @@ from pipecore.geometry import Array
 KINK_ADVANTAGE = 20.0
 """How much lower the χ² of two straight pieces must be than that of smooth bows."""
 
+MAX_KINK_SHARE = 0.6
+"""The same as a share: where both fit badly, neither is the better."""
+
 MIN_KINK = np.deg2rad(0.3)
 MIN_BOW_RATIO = 0.001
 """A pipe counts as bowed from 3.2 mm in 3 m (ASTM A999)."""
@@ -72,8 +75,8 @@ class _Shape:
 def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shape:
     """Compare the line of centres with smooth bows and with two straight pieces.
 
-    The bows are a parabola and the line of a beam clamped at both ends, with as many
-    parameters as the two pieces. The kink is given as chainage and sag.
+    The bows are those of a beam under an even load however its ends are held, and of
+    parts of one: curves of the fourth degree. The kink is given as chainage and sag.
     """
     step = max(1, len(s) // 40)
     s, lateral = s[::step], lateral[::step]
@@ -88,7 +91,7 @@ def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shap
         return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
 
     straight, _ = chi2([np.ones_like(x), x])
-    smooth, _ = chi2([np.ones_like(x), x, x**2, np.cos(2 * np.pi * x)])
+    smooth, _ = chi2([np.ones_like(x), x, x**2, x**3, x**4])
     best, turn, where = np.inf, 0.0, 0.0
     for knee in x[2:-2]:
         value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
@@ -96,6 +99,6 @@ def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shap
             best, turn, where = value, abs(float(solution[2])), float(knee)
     explained = 1.0 - min(best, smooth) / max(straight, 1e-300)
     length = float(s[-1] - s[0])
-    if best + KINK_ADVANTAGE > smooth or turn / length < MIN_KINK:
+    if best + KINK_ADVANTAGE > smooth or best > MAX_KINK_SHARE * smooth or turn / length < MIN_KINK:
         return _Shape(explained, None)
     return _Shape(explained, (float(s[0]) + where * length, turn * where * (1 - where)))
