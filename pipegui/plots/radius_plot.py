@@ -18,7 +18,7 @@ from pipegui.view_state import RadiusPlotState
 EMPTY = "Select an element to see its radius from profile to profile."
 CLICK_PX = 20
 POINT_PX = 6
-X_AXES = ("Profile index", "Chainage, m")
+X_AXES = {"Index": "Profile index", "Chainage": "Chainage, m"}
 
 
 class RadiusPlot(Chart):
@@ -34,6 +34,7 @@ class RadiusPlot(Chart):
         self._x: Array = np.empty(0)
         self._pattern: Pattern | None = None
         self.stacks = QComboBox()
+        self.stacks.setMinimumContentsLength(14)
         self.stacks.setToolTip("The stack whose profiles are plotted.")
         self.stacks.activated.connect(self._choose_stack)
         self.x_axis = QComboBox()
@@ -45,8 +46,12 @@ class RadiusPlot(Chart):
         self.header.addWidget(self.x_axis)
         self.header.addStretch(1)
         self.layout_key()
-        self.radius = self.add_plot(0, "Semi-minor axis, mm")
-        self.offset = self.add_plot(1, "Centre off, mm", X_AXES[0])
+        self.radius = self.add_plot(0, "mm")
+        self.offset = self.add_plot(1, "mm", X_AXES["Index"])
+        # Inside the plot: beside its axis there is no room for it in a small panel.
+        self.offset_title = pg.LabelItem("centre off the axis")
+        self.offset_title.setParentItem(self.offset.vb)
+        self.offset_title.anchor((0, 0), (0, 0), offset=(4, -2))
         self.offset.setXLink(self.radius)
         self.canvas.ci.layout.setRowStretchFactor(0, 5)
         self.canvas.ci.layout.setRowStretchFactor(1, 2)
@@ -105,7 +110,8 @@ class RadiusPlot(Chart):
         self.readout.clear()
         self.radius.clear()
         self.offset.clear()
-        self.offset.setLabel("bottom", self.x_axis.currentText())
+        self.offset.setLabel("bottom", X_AXES[self.x_axis.currentText()])
+        self.offset_title.setText("centre off the axis", color=theme.colour("muted"), size="8pt")
         profiles = state.shown
         if state.element is None or not len(profiles):
             self._pattern, self._x = None, np.empty(0)
@@ -207,7 +213,7 @@ class RadiusPlot(Chart):
             f'<span style="color:{c.name()}">{s}</span>'
             for c, s in ((data, "●"), (fitted, "━"), (data, "╍"), (faint(data, 1), "▒"))
         )
-        self.key.setText(f"{dot} profiles&nbsp; {line} fitted&nbsp; {dash} {band} {scatter}")
+        self.key.setText(f"{dot} semi-minor axis&nbsp; {line} fitted&nbsp; {dash} {band} {scatter}")
 
     def _fit(self) -> None:
         """Show all points with a margin; a few wild ones must not flatten the rest."""

@@ -17,7 +17,7 @@ from pipegui.colour_maps import (
 from pipegui.document import ColourBy, ViewOptions
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
 
-MUTED = {False: (201, 206, 212), True: (70, 76, 84)}
+MUTED = {False: (217, 221, 227), True: (70, 76, 84)}
 """Points that the colouring says nothing about, on light and on dark background."""
 
 KIND_COLOUR = {

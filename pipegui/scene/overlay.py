@@ -105,13 +105,14 @@ class Overlay(QWidget):
         self._targets = []
         if not self.labels:
             return
-        area = self.rect()
+        area, ground = self.rect(), tuple(taken)
         pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
         order = sorted(range(len(self.labels)), key=lambda i: not self.labels[i].is_selected)
         marks = []
         for i in order:
             anchor = QPointF(*pixels[i]) if np.isfinite(pixels[i]).all() else QPointF(-1, -1)
-            if not QRectF(area).contains(anchor):
+            is_covered = any(box.contains(anchor) for box in ground)
+            if is_covered or not QRectF(area).contains(anchor):
                 continue
             label = self.labels[i]
             width = painter.fontMetrics().horizontalAdvance(label.text) + ICON + 3 * SPACING
