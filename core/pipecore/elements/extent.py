@@ -15,6 +15,8 @@ SHOWN_GAP = 2.0
 MIN_COVERED_ARC = float(np.deg2rad(50.0))
 SHARE_OF_ARC = 0.45
 """A step of axis is covered if it shows this share of the arc that the element usually shows."""
+MIN_TURNING = 0.4
+"""Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
 
 
@@ -45,6 +47,7 @@ def find_extent(
     chainage: Array,
     clock: Array,
     residual: Array,
+    lean: Array,
     length: float,
     radius: float,
     voxel: float,
@@ -52,13 +55,17 @@ def find_extent(
 ) -> Extent | None:
     """Find how far points on a surface cover its axis, outward from where it was proposed.
 
-    A step of axis is covered if points lie around enough of it and most of them on the
-    surface: where a bend, a reducer or a flange takes over, the residuals grow together.
+    A step of axis is covered if points lie around enough of it, most of them on the
+    surface, and their normals turn with the clock: where a bend, a reducer or a flange
+    takes over, the residuals grow together; where a pipe leaves the floor that it lies
+    on, the strip of floor below its axis is as near, but flat.
 
     Parameters
     ----------
     chainage, clock, residual : ndarray, shape (n,)
         Of the points near the surface.
+    lean : ndarray, shape (n,)
+        Angle from the surface's normal to each point's own, towards increasing clock.
     length : float
         The proposed extent is chainage 0 … `length`.
     radius, voxel, sigma : float
@@ -88,8 +95,10 @@ def find_extent(
     usual_arc = float(np.quantile(arc[is_core], 0.75))
     # Half of normal residuals are below 0.67 sigma.
     off = _median_by_row(np.abs(residual), row, n_rows)
-    is_covered = (arc >= max(SHARE_OF_ARC * usual_arc, MIN_COVERED_ARC)) & (
-        off < 1.2 * sigma + min(0.006 * radius, 0.0015)
+    is_covered = (
+        (arc >= max(SHARE_OF_ARC * usual_arc, MIN_COVERED_ARC))
+        & (off < 1.2 * sigma + min(0.006 * radius, 0.0015))
+        & (turning_by_row(clock, lean, row, n_rows) > MIN_TURNING)
     )
     covered = np.flatnonzero(is_covered)
     if not is_covered[is_core].any():
@@ -106,6 +115,21 @@ def find_extent(
         len(part) / (last - first + 1),
         tuple((base + (part[b] + 1) * step, base + part[b + 1] * step) for b in breaks),
     )
+
+
+def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int) -> Array:
+    """How much the normals of each row turn with the clock: 1 on a pipe, 0 on a plane."""
+
+    def total(values: Array) -> Array:
+        return np.bincount(row, values, minlength=n_rows)
+
+    middle = np.arctan2(total(np.sin(clock)), total(np.cos(clock)))
+    around = np.mod(clock - middle[row] + np.pi, 2 * np.pi) - np.pi
+    with np.errstate(invalid="ignore", divide="ignore"):
+        n = np.bincount(row, minlength=n_rows)
+        x = around - (total(around) / n)[row]
+        slope = total(x * (lean - (total(lean) / n)[row])) / total(x * x)
+    return np.nan_to_num(1.0 + slope)
 
 
 def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:

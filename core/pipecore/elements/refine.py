@@ -92,9 +92,11 @@ def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted |
         thinned = thinned[is_free[thinned]]
         near = _points_on(model, thinned, nearby, sigma)
         chainage, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
+        lean = _lean(nearby.surface.normals[near.own], near.outward, axis.tangent(chainage))
         extent = find_extent(
-            chainage, clock, near.residual, axis.length, model.radius, nearby.surface.voxel, sigma
-        )
+            chainage, clock, near.residual, lean,
+            axis.length, model.radius, nearby.surface.voxel, sigma,
+        )  # fmt: skip
         if extent is None:
             return None
         inside = (chainage >= extent.low) & (chainage <= extent.high)
@@ -151,6 +153,7 @@ def _margin(axis: LineAxis | ArcAxis, radius: float, round_: int) -> float:
 class _Near:
     own: Indices
     residual: Array
+    outward: Array
 
 
 def _points_on(
@@ -163,7 +166,15 @@ def _points_on(
     residual, _, outward = model.residuals(nearby.surface.xyz[thinned])
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
     on = (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
-    return _Near(thinned[on], residual[on])
+    return _Near(thinned[on], residual[on], outward[on])
+
+
+def _lean(normals: Array, outward: Array, tangent: Array) -> Array:
+    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
+    clockwise = np.cross(tangent, outward)
+    ahead = np.einsum("ij,ij->i", normals, clockwise)
+    out = np.einsum("ij,ij->i", normals, outward)
+    return np.asarray(np.arctan(ahead / np.where(out == 0.0, np.inf, out)))
 
 
 def _fit_to(
@@ -187,7 +198,7 @@ def _fit_to(
 def _refine_sphere(model: SphereSurface, nearby: NearbyPoints, is_free: Flags) -> Fitted | None:
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     fit: SurfaceFit[SphereSurface] | None = None
-    near = _Near(np.empty(0, np.intp), np.empty(0))
+    near = _Near(np.empty(0, np.intp), np.empty(0), np.empty((0, 3)))
     for _ in range(N_ROUNDS):
         ball = nearby.within_ball(model.centre, 1.2 * model.radius)
         near = _points_on(model, ball[is_free[ball]], nearby, sigma)
