@@ -84,16 +84,15 @@ def detect(
             ]
         )
     with _timed(seconds, "axes"):
-        width = float(np.median([s.width for s in stacks]))
-        chains = join_centres(ellipses, width, progress)
+        chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):
-        pieces = find_pieces(ellipses, chains, width, progress)
+        pieces = find_pieces(ellipses, chains, progress)
         nearby = NearbyPoints(cloud, surface)
         built = build_elements(pieces, nearby, settings.elements, progress)
         profiles = tabulate_ellipses(built.elements, ellipses)
     with _timed(seconds, "deformations"):
         measured = measure_elements(
-            built, nearby, len(cloud), width, settings.deformation, progress
+            built, nearby, len(cloud), stacks[0].width, settings.deformation, progress
         )
         deformations = judge_deformations(measured.deformations, measured.elements, rule)
     return Result(

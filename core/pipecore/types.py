@@ -71,7 +71,8 @@ class Stack:
     """All parallel profiles of one direction (paper, section 3.1).
 
     Profile `i` holds the points whose distance along `direction` from the local zero
-    lies in [offset + i·width, offset + (i + 1)·width).
+    lies in [offset + i·width, offset + (i + 1)·width). Only points that are at least
+    `min_spacing` from their neighbours join: wide profiles are for thinly scanned places.
     """
 
     stack_id: int
@@ -79,6 +80,7 @@ class Stack:
     width: float
     offset: float = 0.0
     name: str = ""
+    min_spacing: float = 0.0
 
     def profile_index(self, xyz: Floats) -> NDArray[np.int32]:
         """Index of the profile that each point of `xyz` (n, 3) falls into."""

@@ -28,7 +28,7 @@ def fit_planes(
 ):
     """Fit a plane to the neighbours of points start … stop within `radius`.
 
-    Where there are fewer than `min_neighbours`, within twice and four times the radius.
+    Where there are fewer than `min_neighbours`, the radius grows in steps up to fourfold.
     `xyz` is sorted by cell; `cells` holds each point's cell (ix, iy, iz), whose edge is
     `radius`. Writes the normal, the root mean square distance from the plane, and the
     spacing of the points; nan where there are too few.
@@ -38,8 +38,9 @@ def fit_planes(
         px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
         normals[i, 0] = normals[i, 1] = normals[i, 2] = math.nan
         residuals[i] = spacings[i] = math.nan
-        for reach in (1, 2, 4):
-            r2 = (reach * radius) ** 2
+        for quarters in (4, 5, 6, 7, 8, 10, 12, 16):
+            reach = (quarters + 3) // 4
+            r2 = (0.25 * quarters * radius) ** 2
             n = 0
             sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
             for dx in range(-reach, reach + 1):
@@ -71,7 +72,7 @@ def fit_planes(
                 x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
                 normals[i, 0], normals[i, 1], normals[i, 2] = x, y, z
                 residuals[i] = math.sqrt(max(least, 0.0) * n / (n - 3.0))
-                spacings[i] = reach * radius * math.sqrt(math.pi / n)
+                spacings[i] = 0.25 * quarters * radius * math.sqrt(math.pi / n)
                 break
 
 

@@ -21,14 +21,12 @@ MAX_OFFSET = 0.1
 """They are off each other's axis by less than this share of the radius."""
 
 
-def join_centres(ellipses: Ellipses, width: float, progress: Progress) -> NDArray[np.int32]:
+def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
     """Chain the centres of ellipses that follow each other along one axis.
 
     Parameters
     ----------
     ellipses : Ellipses
-    width : float
-        Profile width, metres.
     progress : Progress
 
     Returns
@@ -42,12 +40,13 @@ def join_centres(ellipses: Ellipses, width: float, progress: Progress) -> NDArra
         return np.empty(0, np.int32)
     tree = cKDTree(ellipses.centre)
     # Wide pipes have coarser centres, so they look further; each size class by itself.
-    reach = np.maximum(REACH * width, WIDE_REACH * ellipses.radius)
+    reach = np.maximum(REACH * ellipses.width, WIDE_REACH * ellipses.radius)
+    least = reach.min()
     links = []
-    size_class = np.ceil(np.log2(reach / (REACH * width))).astype(int)
+    size_class = np.ceil(np.log2(reach / least) - 1e-9).astype(int)
     for k in np.unique(size_class):
         members = np.flatnonzero(size_class == k)
-        distance = REACH * width * 2.0**k
+        distance = least * 2.0**k
         near = tree if k == 0 else cKDTree(ellipses.centre[members])
         pairs = near.query_pairs(distance, output_type="ndarray")
         if k > 0:

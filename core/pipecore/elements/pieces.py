@@ -61,7 +61,7 @@ class Piece:
 
 
 def find_pieces(
-    ellipses: Ellipses, chain: NDArray[np.int32], width: float, progress: Progress
+    ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
 ) -> list[Piece]:
     """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
 
@@ -70,8 +70,6 @@ def find_pieces(
     ellipses : Ellipses
     chain : ndarray of int32
         Chain of each ellipse.
-    width : float
-        Profile width, metres.
     progress : Progress
     """
     pieces = find_spheres(ellipses)
@@ -81,12 +79,12 @@ def find_pieces(
         progress.update("elements", 0.3 * i / max(len(chains), 1))
         if len(members) < MIN_ELLIPSES:
             continue
-        pieces += _explain_chain(ellipses, members, width, progress)
+        pieces += _explain_chain(ellipses, members, progress)
     return pieces
 
 
 def _explain_chain(
-    ellipses: Ellipses, members: NDArray[np.intp], width: float, progress: Progress
+    ellipses: Ellipses, members: NDArray[np.intp], progress: Progress
 ) -> list[Piece]:
     pieces: list[Piece] = []
 
@@ -96,33 +94,33 @@ def _explain_chain(
         for piece in found:
             members = np.setdiff1d(members, piece.ellipses)
 
-    take(_take_lines(ellipses, members, width, LONG_PIECE))
-    take(_take_lines(ellipses, members, width, SHORT_PIECE, is_tapered=True))
-    for group in _reconnected(ellipses, members, width, progress):
+    take(_take_lines(ellipses, members, LONG_PIECE))
+    take(_take_lines(ellipses, members, SHORT_PIECE, is_tapered=True))
+    for group in _reconnected(ellipses, members, progress):
         take(_take_arcs(ellipses, group))
-    take(_take_lines(ellipses, members, width, SHORT_PIECE))
+    take(_take_lines(ellipses, members, SHORT_PIECE))
     return pieces
 
 
 def _reconnected(
-    ellipses: Ellipses, members: NDArray[np.intp], width: float, progress: Progress
+    ellipses: Ellipses, members: NDArray[np.intp], progress: Progress
 ) -> list[NDArray[np.intp]]:
     """Groups of the members that still hang together."""
     if len(members) < MIN_ELLIPSES:
         return []
-    label = join_centres(ellipses[members], width, progress)
+    label = join_centres(ellipses[members], progress)
     return [members[label == k] for k in range(label.max() + 1)]
 
 
 def _take_lines(
     ellipses: Ellipses,
     members: NDArray[np.intp],
-    width: float,
     min_length: float,
     is_tapered: bool = False,
 ) -> list[Piece]:
     """Take straight pieces of at least `min_length` radii off the members, best first."""
     e = ellipses[members]
+    width = float(np.median(e.width))
     free = np.ones(len(members), np.bool_)
     inliers = np.empty(len(members), np.bool_)
     pieces: list[Piece] = []

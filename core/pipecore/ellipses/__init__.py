@@ -39,6 +39,8 @@ class Ellipses:
     Parameters
     ----------
     stack_id, profile_index : ndarray of int32, shape (m,)
+    width : ndarray, shape (m,)
+        Width of the profile, metres.
     centre : ndarray, shape (m, 3)
         Local coordinates.
     normal : ndarray, shape (m, 3)
@@ -64,6 +66,7 @@ class Ellipses:
 
     stack_id: NDArray[np.int32]
     profile_index: NDArray[np.int32]
+    width: Array
     centre: Array
     normal: Array
     axis: Array
@@ -205,6 +208,7 @@ def _to_space(
     return Ellipses(
         stack_id=np.full(len(kept), curves.stack.stack_id, np.int32),
         profile_index=curves.profile_index[kept],
+        width=np.full(len(kept), curves.stack.width),
         centre=centre,
         normal=np.broadcast_to(frame[2], centre.shape),
         axis=axis,

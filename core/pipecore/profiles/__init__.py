@@ -115,6 +115,8 @@ def segment_profiles(
         surface.xyz, surface.normals, usable, frame[2], frame[0], frame[1],
         stack.width, stack.offset, MAX_SLOPE, profile, uv, normals,
     )  # fmt: skip
+    if stack.min_spacing:
+        usable &= surface.spacing >= stack.min_spacing
     points = np.flatnonzero(usable)
     profile, uv, normals = profile[points], uv[points], normals[points]
     if len(points) == 0:

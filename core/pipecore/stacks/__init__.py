@@ -1,5 +1,7 @@
 """Stacks: the cloud cut into parallel profiles, in several directions (paper, section 3.1)."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -15,6 +17,11 @@ __all__ = ["choose_stacks", "preset_directions"]
 
 WIDTH = 2.0
 """Automatic profile width, in voxels."""
+WIDE_FACTORS = (2.5,)
+"""Widths of the wide profiles, in those of the narrow ones."""
+SPARSE = 0.5
+"""A place is cut by wide profiles if its spacing is this share of their width in voxels."""
+MIN_SPARSE_SHARE = 0.002
 
 
 def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
@@ -52,10 +59,31 @@ def choose_stacks(
         raise SettingsError(
             "There are no stacks to cut; choose directions other than “none” or give your own."
         )
-    return tuple(
+    stacks = [
         Stack(i, unit(direction), stack_width, 0.0, name)
         for i, (name, direction, stack_width) in enumerate(named, start=1)
-    )
+    ]
+    return (*stacks, *_wide_stacks(stacks, surface))
+
+
+def _wide_stacks(stacks: list[Stack], surface: Surface) -> list[Stack]:
+    """The same directions cut wider, for the places where profiles would hold too few points."""
+    wide: list[Stack] = []
+    for factor in WIDE_FACTORS:
+        min_spacing = SPARSE * factor * surface.voxel
+        if (surface.spacing >= min_spacing).mean() < MIN_SPARSE_SHARE:
+            continue
+        wide += [
+            replace(
+                stack,
+                stack_id=len(stacks) + len(wide) + i,
+                width=factor * stack.width,
+                name=f"{stack.name}, wide",
+                min_spacing=min_spacing,
+            )
+            for i, stack in enumerate(stacks, start=1)
+        ]
+    return wide
 
 
 def describe_direction(direction: ArrayLike) -> str:
