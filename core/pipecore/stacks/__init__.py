@@ -17,11 +17,10 @@ __all__ = ["choose_stacks", "preset_directions"]
 
 WIDTH = 2.0
 """Automatic profile width, in voxels."""
-WIDE_FACTORS = (2.5,)
-"""Widths of the wide profiles, in those of the narrow ones."""
-SPARSE = 0.5
-"""A place is cut by wide profiles if its spacing is this share of their width in voxels."""
-MIN_SPARSE_SHARE = 0.002
+WIDER = 2.5
+"""Width of the wide profiles, in those of the narrow ones."""
+SPARSE = 1.25
+"""Places with at least this spacing, in voxels, are cut by wide profiles too."""
 
 
 def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
@@ -68,22 +67,19 @@ def choose_stacks(
 
 def _wide_stacks(stacks: list[Stack], surface: Surface) -> list[Stack]:
     """The same directions cut wider, for the places where profiles would hold too few points."""
-    wide: list[Stack] = []
-    for factor in WIDE_FACTORS:
-        min_spacing = SPARSE * factor * surface.voxel
-        if (surface.spacing >= min_spacing).mean() < MIN_SPARSE_SHARE:
-            continue
-        wide += [
-            replace(
-                stack,
-                stack_id=len(stacks) + len(wide) + i,
-                width=factor * stack.width,
-                name=f"{stack.name}, wide",
-                min_spacing=min_spacing,
-            )
-            for i, stack in enumerate(stacks, start=1)
-        ]
-    return wide
+    min_spacing = SPARSE * surface.voxel
+    if not (surface.spacing >= min_spacing).any():
+        return []
+    return [
+        replace(
+            stack,
+            stack_id=len(stacks) + stack.stack_id,
+            width=WIDER * stack.width,
+            name=f"{stack.name}, wide",
+            min_spacing=min_spacing,
+        )
+        for stack in stacks
+    ]
 
 
 def describe_direction(direction: ArrayLike) -> str:
