@@ -24,13 +24,15 @@ Array = NDArray[np.float64]
 
 MIN_COVERAGE = 0.5
 """Share of an element's length that must be covered by points."""
-MIN_ARC = np.deg2rad(55.0)
-SURE_ARC, SHARP_RADIUS_SD = np.deg2rad(100.0), 0.010
-"""On shorter arcs the points must carry the radius to this share of it."""
+MIN_ARC, MIN_BEND_ARC = np.deg2rad(55.0), np.deg2rad(75.0)
+SURE_ARC, SHARP_RADIUS_SD, LONG_RADIUS_SD = np.deg2rad(100.0), 0.010, 0.035
+"""On shorter arcs the points must carry the radius to this share of it, or to the latter ..."""
+LONG = 3.0
+"""... where a straight is longer than this many radii: no corner and no chance is."""
 MAX_RADIUS_SD = 0.04
 """Largest standard deviation of a radius, as a share of it."""
-MAX_MISFIT = 0.015
-"""Largest root mean square by which a section leaves circle and oval, as a share of the radius."""
+MAX_MISFIT, MAX_NOISE_MISFIT = 0.015, 0.35
+"""Largest root mean square by which a section leaves circle and oval, in radii and in noise."""
 MAX_SPHERE_MISFIT = 0.001
 """The same for spheres, over patches of the surface: vessel heads are flatter on top."""
 MIN_TAPER_CHANGE = 0.06
@@ -189,13 +191,16 @@ def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) 
         return False
     if isinstance(model, SphereSurface):
         return len(found.own) >= 60 and found.misfit < MAX_SPHERE_MISFIT * radius + 0.0003
-    is_round = found.misfit < MAX_MISFIT * radius + 0.0005
+    is_round = found.misfit < MAX_MISFIT * radius + MAX_NOISE_MISFIT * found.fit.sigma
     is_seen = extent.coverage >= MIN_COVERAGE and extent.arc >= MIN_ARC
-    is_sharp = extent.arc >= SURE_ARC or radius_sd < SHARP_RADIUS_SD * radius
+    is_long = isinstance(model, LineSurface) and found.axis.length > LONG * radius
+    sharp = LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
+    is_sharp = extent.arc >= SURE_ARC or radius_sd < sharp * radius
     if not (is_round and is_seen and is_sharp):
         return False
     if isinstance(model, ArcSurface):
-        return model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
+        is_seen = extent.arc >= MIN_BEND_ARC
+        return is_seen and model.bend_radius > 1.02 * radius and found.axis.length > 0.4 * radius
     if model.is_tapered:
         change = abs(found.radii[1] - found.radii[0])
         return change > MIN_TAPER_CHANGE * radius and found.axis.length > 0.3 * radius

@@ -18,6 +18,8 @@ SHARE_OF_ARC = 0.45
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
+LONGEST_STEP = 0.03
+"""Ends of wide vessels are to be found as well as those of pipes, metres."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def find_extent(
     lean: Array,
     length: float,
     radius: float,
-    voxel: float,
+    spacing: float,
     sigma: float,
 ) -> Extent | None:
     """Find how far points on a surface cover its axis, outward from where it was proposed.
@@ -68,8 +70,8 @@ def find_extent(
         Angle from the surface's normal to each point's own, towards increasing clock.
     length : float
         The proposed extent is chainage 0 … `length`.
-    radius, voxel, sigma : float
-        Radius, thinning and noise, metres.
+    radius, spacing, sigma : float
+        Radius, distance between neighbouring points and noise, metres.
 
     Returns
     -------
@@ -78,12 +80,12 @@ def find_extent(
     """  # fmt: skip
     if len(chainage) == 0:
         return None
-    step = max(2.0 * voxel, 0.15 * radius)
+    step = max(2.0 * spacing, min(0.15 * radius, LONGEST_STEP))
     base = float(chainage.min())
     row = ((chainage - base) / step).astype(np.intp)
     n_rows = int(row.max()) + 1
     # A sector is wide enough to hold a point wherever the surface is seen.
-    n_sectors = int(np.clip(2 * np.pi * radius / (2.0 * voxel), 12, MAX_SECTORS))
+    n_sectors = int(np.clip(2 * np.pi * radius / (2.0 * spacing), 12, MAX_SECTORS))
     sector = (clock / (2 * np.pi) * n_sectors).astype(np.intp) % n_sectors
     seen = np.zeros((n_rows, n_sectors), np.bool_)
     seen[row, sector] = True

@@ -17,6 +17,7 @@ from pipecore.elements.surfaces import (
     fit_surface,
 )
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.surface import Surface
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -92,10 +93,11 @@ def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted |
         thinned = thinned[is_free[thinned]]
         near = _points_on(model, thinned, nearby, sigma)
         chainage, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
+        spacing = _usual_spacing(nearby.surface, near.own)
         lean = _lean(nearby.surface.normals[near.own], near.outward, axis.tangent(chainage))
         extent = find_extent(
             chainage, clock, near.residual, lean,
-            axis.length, model.radius, nearby.surface.voxel, sigma,
+            axis.length, model.radius, spacing, sigma,
         )  # fmt: skip
         if extent is None:
             return None
@@ -167,6 +169,11 @@ def _points_on(
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
     on = (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
     return _Near(thinned[on], residual[on], outward[on])
+
+
+def _usual_spacing(surface: Surface, own: Indices) -> float:
+    """Distance between neighbours among some points, not below the thinning's, metres."""
+    return max(surface.voxel, float(np.median(surface.spacing[own]))) if len(own) else np.nan
 
 
 def _lean(normals: Array, outward: Array, tangent: Array) -> Array:

@@ -162,7 +162,7 @@ def fit_ellipses(
     return ellipses[aic_ellipse < aic_line]
 
 
-SHARP_ARC_DEG, SHARP_RADIUS_SD = 60.0, 0.012
+SHARP_ARC_DEG, SHARP_RADIUS_SD = 45.0, 0.10
 """Arcs down to this many degrees are enough where they carry the radius to this share of it."""
 MIN_RADIAL = 0.75
 """Share of a curve's normals that must point to the centre."""
