@@ -189,9 +189,10 @@ class EllipseSettings:
         advanced=True,
     )
     min_arc_deg: float = setting(
-        80.0,
+        45.0,
         "Smallest arc",
-        "Ellipses seen over less of their circumference are not used.",
+        "Ellipses seen over less of their circumference are not used; below 80° only those "
+        "whose points carry the radius.",
         unit="°",
         minimum=30.0,
         maximum=360.0,

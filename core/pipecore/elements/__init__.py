@@ -35,10 +35,14 @@ MAX_MISFIT, MAX_NOISE_MISFIT = 0.015, 0.35
 """Largest root mean square by which a section leaves circle and oval, in radii and in noise."""
 MAX_SPHERE_MISFIT = 0.001
 """The same for spheres, over patches of the surface: vessel heads are flatter on top."""
+ROUGH = 1.5
+"""Slack for pieces whose last round of fitting is still to come."""
 MIN_TAPER_CHANGE = 0.06
 """A cone's radius changes at least by this share."""
 MIN_LENGTH = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
+WIDE, WHOLE_ARC, MIN_WIDE_LENGTH = 0.18, np.deg2rad(200.0), 0.6
+"""Wide cylinders that are not seen all round are longer than this many radii: heads are not."""
 FLANGE_RATIO = (1.12, 2.8)
 FLANGE_LENGTH = 0.9
 """A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
@@ -171,7 +175,12 @@ class _Keeper:
             usable = usable.copy()
             for i, _ in between:
                 usable[self.fitted[i].own] = True
-        found = refine_piece(piece, self._nearby, usable)
+        found = refine_piece(
+            piece,
+            self._nearby,
+            usable,
+            lambda rough: is_credible(rough, self._nearby, self._settings, ROUGH),
+        )
         if found is None or not is_credible(found, self._nearby, self._settings):
             return
         if between is not None:
@@ -181,18 +190,25 @@ class _Keeper:
         self.fitted.append(found)
 
 
-def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) -> bool:
-    """Whether a refined piece is a pipe element and not a corner, a bundle or a chance."""
+def is_credible(
+    found: Fitted, nearby: NearbyPoints, settings: ElementSettings, slack: float = 1.0
+) -> bool:
+    """Whether a refined piece is a pipe element and not a corner, a bundle or a chance.
+
+    `slack` multiplies the limits of what a last round of fitting can mend.
+    """
     model, extent = found.fit.model, found.extent
-    radius, radius_sd = model.radius, found.fit.radius_sd
+    radius = model.radius
     is_sized = settings.min_radius_mm <= radius * 1e3 <= settings.max_radius_mm
-    max_sigma = min(max(4.0 * nearby.surface.noise, 0.004), 0.08 * radius)
+    misfit = found.misfit / slack
+    radius_sd = found.fit.radius_sd / slack**2
+    max_sigma = slack * min(max(4.0 * nearby.surface.noise, 0.004), 0.08 * radius)
     if not is_sized or found.fit.sigma > max_sigma or radius_sd > MAX_RADIUS_SD * radius:
         return False
     if isinstance(model, SphereSurface):
-        return len(found.own) >= 60 and found.misfit < MAX_SPHERE_MISFIT * radius + 0.0003
-    is_round = found.misfit < MAX_MISFIT * radius + MAX_NOISE_MISFIT * found.fit.sigma
-    is_seen = extent.coverage >= MIN_COVERAGE and extent.arc >= MIN_ARC
+        return len(found.own) >= 60 and misfit < MAX_SPHERE_MISFIT * radius + 0.0003
+    is_round = misfit < MAX_MISFIT * radius + MAX_NOISE_MISFIT * found.fit.sigma
+    is_seen = extent.coverage >= MIN_COVERAGE / slack and extent.arc >= MIN_ARC / slack
     is_long = isinstance(model, LineSurface) and found.axis.length > LONG * radius
     sharp = LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
     is_sharp = extent.arc >= SURE_ARC or radius_sd < sharp * radius
@@ -204,7 +220,8 @@ def is_credible(found: Fitted, nearby: NearbyPoints, settings: ElementSettings) 
     if model.is_tapered:
         change = abs(found.radii[1] - found.radii[0])
         return change > MIN_TAPER_CHANGE * radius and found.axis.length > 0.3 * radius
-    return found.axis.length > 2.0 * nearby.surface.voxel
+    shortest = MIN_WIDE_LENGTH * radius if radius > WIDE and extent.arc < WHOLE_ARC else 0.0
+    return found.axis.length > max(2.0 * nearby.surface.voxel, shortest)
 
 
 def _kind(found: Fitted) -> ElementKind:

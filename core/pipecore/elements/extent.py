@@ -123,7 +123,7 @@ def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int
     """How much the normals of each row turn with the clock: 1 on a pipe, 0 on a plane."""
 
     def total(values: Array) -> Array:
-        return np.bincount(row, values, minlength=n_rows)
+        return np.bincount(row, values, minlength=n_rows).astype(np.float64)
 
     middle = np.arctan2(total(np.sin(clock)), total(np.cos(clock)))
     around = np.mod(clock - middle[row] + np.pi, 2 * np.pi) - np.pi

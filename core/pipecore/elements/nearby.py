@@ -22,6 +22,7 @@ class NearbyPoints:
         self._cloud = cloud
         self.surface = surface
         self._tree = cKDTree(surface.xyz)
+        self._is_found = np.zeros(len(surface.xyz), np.bool_)
         self._members, self._starts = group_by_label(surface.parent, len(surface.xyz))
 
     def thinned(self, axis: Axis, radius: float, margin: float) -> NDArray[np.intp]:
@@ -31,7 +32,10 @@ class NearbyPoints:
         places = axis.at(np.linspace(-margin, axis.length + margin, n))
         half_step = 0.5 * (axis.length + 2 * margin) / (n - 1)
         balls = self._tree.query_ball_point(places, float(np.hypot(OUTER * radius, half_step)))
-        found = np.unique(np.concatenate([np.asarray(b, np.intp) for b in balls]))
+        for ball in balls:
+            self._is_found[ball] = True
+        found = np.flatnonzero(self._is_found)
+        self._is_found[found] = False
         if len(found) == 0:
             return found
         chainage, rho, _ = axis.pipe_coordinates(self.surface.xyz[found])

@@ -60,9 +60,7 @@ class Piece:
     high: float = 0.0
 
 
-def find_pieces(
-    ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
-) -> list[Piece]:
+def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress) -> list[Piece]:
     """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
 
     Parameters

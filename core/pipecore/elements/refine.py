@@ -1,5 +1,6 @@
 """Refinement: a robust geometric fit of each piece to all points around it, and its extent."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +26,8 @@ Flags = NDArray[np.bool_]
 
 RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
 """A point belongs to a surface only if its normal is this close to the surface's."""
-MAX_FIT_POINTS = 60_000
-"""Larger elements are fitted to an even sample of this many points."""
+MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 4_000
+"""Larger elements are fitted to an even sample of this many points; fewer in early rounds."""
 MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
 N_ROUNDS = 3
@@ -64,7 +65,12 @@ class Fitted:
         return model.radius_at(self.axis.start), model.radius_at(self.axis.end)
 
 
-def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted | None:
+def refine_piece(
+    piece: Piece,
+    nearby: NearbyPoints,
+    is_free: Flags,
+    is_promising: Callable[[Fitted], bool] = lambda fitted: True,
+) -> Fitted | None:
     """Fit a piece's surface to the cloud's points and find how far it reaches.
 
     Fit and extent improve each other in a few rounds.
@@ -75,6 +81,8 @@ def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted |
     nearby : NearbyPoints
     is_free : ndarray of bool
         Thinned points that no other element has taken.
+    is_promising : callable
+        Asked before the last round, which alone uses all points: most pieces end there.
 
     Returns
     -------
@@ -82,12 +90,15 @@ def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted |
         None where the points do not carry the surface.
     """
     if isinstance(piece.model, SphereSurface):
-        return _refine_sphere(piece.model, nearby, is_free)
+        return _refine_sphere(piece.model, nearby, is_free, is_promising)
     model = piece.model
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     axis = axis_between(model, piece.low, piece.high)
     fitted = None
     for round_ in range(N_ROUNDS):
+        is_final = round_ == N_ROUNDS - 1
+        if is_final and not (fitted and is_promising(fitted)):
+            return None
         margin = _margin(axis, model.radius, round_)
         thinned = nearby.thinned(axis, model.radius, margin)
         thinned = thinned[is_free[thinned]]
@@ -105,7 +116,8 @@ def refine_piece(piece: Piece, nearby: NearbyPoints, is_free: Flags) -> Fitted |
         # Near the ends other surfaces begin, so the fit stays clear of them.
         clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
         core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
-        fit = _fit_to(model, near.own[core if core.sum() > 30 else inside], nearby, 3.0 * sigma)
+        chosen = near.own[core if core.sum() > 30 else inside]
+        fit = _fit_to(model, chosen, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
         misfit = section_misfit(clock[inside], near.residual[inside], extent.arc)
@@ -171,6 +183,13 @@ def _points_on(
     return _Near(thinned[on], residual[on], outward[on])
 
 
+def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
+    """At most `limit` of the rows, evenly spread over them."""
+    if len(rows) <= limit:
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
+
+
 def _usual_spacing(surface: Surface, own: Indices) -> float:
     """Distance between neighbours among some points, not below the thinning's, metres."""
     return max(surface.voxel, float(np.median(surface.spacing[own]))) if len(own) else np.nan
@@ -189,37 +208,55 @@ def _fit_to(
     thinned: Indices,
     nearby: NearbyPoints,
     scale: float,
+    is_final: bool,
 ) -> SurfaceFit[Any] | None:
-    """Fit the model to all points of the cloud behind thinned ones."""
+    """Fit the model to thinned points; in the last round to all points of the cloud behind them."""
     if len(thinned) < 15:
         return None
-    _, points, _ = nearby.of_cloud(thinned)
-    if len(points) > MAX_FIT_POINTS:
-        points = points[np.linspace(0, len(points) - 1, MAX_FIT_POINTS).astype(np.intp)]
+    if is_final:
+        _, points, _ = nearby.of_cloud(thinned)
+        if len(points) > MAX_FIT_POINTS:
+            # In an order of their own, so that the cloud's order does not matter.
+            points = _evenly(points[np.lexsort(points.T)], MAX_FIT_POINTS)
+    else:
+        points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
     fit = fit_surface(model, points, scale)
     if fit is None or abs(fit.model.radius - model.radius) > MAX_RADIUS_CHANGE * model.radius:
         return None
     return fit
 
 
-def _refine_sphere(model: SphereSurface, nearby: NearbyPoints, is_free: Flags) -> Fitted | None:
+def _refine_sphere(
+    model: SphereSurface,
+    nearby: NearbyPoints,
+    is_free: Flags,
+    is_promising: Callable[[Fitted], bool],
+) -> Fitted | None:
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
-    fit: SurfaceFit[SphereSurface] | None = None
-    near = _Near(np.empty(0, np.intp), np.empty(0), np.empty((0, 3)))
-    for _ in range(N_ROUNDS):
+    fitted = None
+    for round_ in range(N_ROUNDS):
+        is_final = round_ == N_ROUNDS - 1
+        if is_final and not (fitted and is_promising(fitted)):
+            return None
         ball = nearby.within_ball(model.centre, 1.2 * model.radius)
         near = _points_on(model, ball[is_free[ball]], nearby, sigma)
-        fit = _fit_to(model, near.own, nearby, 3.0 * sigma)
+        fit = _fit_to(model, near.own, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
         model = fit.model
         sigma = max(fit.sigma, 0.0005)
-    assert fit is not None
+        fitted = _fitted_sphere(fit, near.own, nearby)
+    return fitted
+
+
+def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:
+    model = fit.model
+    xyz = nearby.surface.xyz[own]
     upright = np.array([0.0, 0.0, 1.0])
-    height = (nearby.surface.xyz[near.own] - model.centre) @ upright
+    height = (xyz - model.centre) @ upright
     axis = LineAxis(model.centre + height.min() * upright, upright, float(np.ptp(height)))
-    _, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
+    _, _, clock = axis.pipe_coordinates(xyz)
     arc = float(len(np.unique((clock / (2 * np.pi) * 36).astype(int))) / 36 * 2 * np.pi)
-    residual, _, outward = model.residuals(nearby.surface.xyz[near.own])
+    residual, _, outward = model.residuals(xyz)
     misfit = sphere_misfit(outward, residual)
-    return Fitted(fit, axis, near.own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)
+    return Fitted(fit, axis, own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)

@@ -132,13 +132,11 @@ def fit_ellipses(
     max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
     radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits[:, 8])
     with np.errstate(invalid="ignore"):
-        # A vessel's arc is short, but it holds many points.
-        is_wide_enough = (arc >= np.deg2rad(settings.min_arc_deg)) | (
-            (arc >= np.deg2rad(SHARP_ARC_DEG)) & (radius_sd < SHARP_RADIUS_SD * radius)
-        )
+        is_sure = (arc >= SURE_ARC) | (radius_sd < MAX_RADIUS_SD * radius)
         accepted = (
             (1.0 - tilt_cos <= settings.max_flattening)
-            & is_wide_enough
+            & (arc >= np.deg2rad(settings.min_arc_deg))
+            & is_sure
             & (rms <= max_rms)
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
@@ -162,8 +160,8 @@ def fit_ellipses(
     return ellipses[aic_ellipse < aic_line]
 
 
-SHARP_ARC_DEG, SHARP_RADIUS_SD = 45.0, 0.10
-"""Arcs down to this many degrees are enough where they carry the radius to this share of it."""
+SURE_ARC, MAX_RADIUS_SD = np.deg2rad(80.0), 0.10
+"""Shorter arcs must carry the radius to this share of it, as those of vessels do."""
 MIN_RADIAL = 0.75
 """Share of a curve's normals that must point to the centre."""
 MAX_OFF_AXIS = 0.35

@@ -39,6 +39,8 @@ def choose_stacks(
 ) -> tuple[Stack, ...]:
     """Return the stacks that the settings ask for: the preset's, then the user's own.
 
+    Those of automatic width come again with wide profiles, for thinly scanned places.
+
     Raises
     ------
     SettingsError
@@ -62,23 +64,27 @@ def choose_stacks(
         Stack(i, unit(direction), stack_width, 0.0, name)
         for i, (name, direction, stack_width) in enumerate(named, start=1)
     ]
-    return (*stacks, *_wide_stacks(stacks, surface))
+    return (*stacks, *_wide_stacks(stacks, surface)) if not settings.width_mm else tuple(stacks)
 
 
 def _wide_stacks(stacks: list[Stack], surface: Surface) -> list[Stack]:
-    """The same directions cut wider, for the places where profiles would hold too few points."""
+    """The same directions cut wider, for the places where profiles would hold too few points.
+
+    Stacks whose width the user gave stay as they are.
+    """
     min_spacing = SPARSE * surface.voxel
+    automatic = [s for s in stacks if s.width == WIDTH * surface.voxel]
     if not (surface.spacing >= min_spacing).any():
         return []
     return [
         replace(
             stack,
-            stack_id=len(stacks) + stack.stack_id,
+            stack_id=len(stacks) + i,
             width=WIDER * stack.width,
             name=f"{stack.name}, wide",
             min_spacing=min_spacing,
         )
-        for stack in stacks
+        for i, stack in enumerate(automatic, start=1)
     ]
 
 

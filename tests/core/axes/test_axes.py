@@ -27,6 +27,7 @@ def along(axis: Axis, radius, step=WIDTH, sd=0.0002, rng=None) -> Ellipses:
     return Ellipses(
         stack_id=np.ones(n, np.int32),
         profile_index=np.arange(n, dtype=np.int32),
+        width=np.full(n, WIDTH),
         centre=centre,
         normal=tangent,
         axis=tangent,
@@ -47,7 +48,7 @@ def along(axis: Axis, radius, step=WIDTH, sd=0.0002, rng=None) -> Ellipses:
 
 def chains_of(*parts: Ellipses) -> list[np.ndarray]:
     """Chain numbers of each part."""
-    chain = join_centres(Ellipses.concatenate(parts), WIDTH, NoProgress())
+    chain = join_centres(Ellipses.concatenate(parts), NoProgress())
     return np.split(chain, np.cumsum([len(p) for p in parts])[:-1])
 
 
@@ -103,7 +104,7 @@ def test_that_a_chain_goes_across_a_short_gap_and_not_across_a_long_one(rng):
 
     def n_chains(gap):
         kept = e[(s < 1.0) | (s > 1.0 + gap)]
-        return join_centres(kept, WIDTH, NoProgress()).max() + 1
+        return join_centres(kept, NoProgress()).max() + 1
 
     assert n_chains(0.03) == 1
     assert n_chains(0.2) == 2
@@ -115,7 +116,7 @@ def test_that_wide_pipes_look_further_ahead(rng):
         e = along(axis, radius, rng=rng)
         s = axis.pipe_coordinates(e.centre)[0]
         kept = e[(s < 0.99) | (s > 1.07)]
-        assert join_centres(kept, WIDTH, NoProgress()).max() + 1 == n_chains
+        assert join_centres(kept, NoProgress()).max() + 1 == n_chains
 
 
 def test_that_a_reducer_is_part_of_its_run(rng):
@@ -132,8 +133,8 @@ def test_that_the_chain_with_most_ellipses_comes_first_whatever_their_order(rng)
     e = Ellipses.concatenate(parts)
     truth = np.repeat([2, 0, 1], [len(p) for p in parts])
     shuffled = rng.permutation(len(e))
-    assert_array_equal(join_centres(e[shuffled], WIDTH, NoProgress()), truth[shuffled])
+    assert_array_equal(join_centres(e[shuffled], NoProgress()), truth[shuffled])
 
 
 def test_that_no_ellipses_make_no_chains(rng):
-    assert len(join_centres(along(straight(rng), 0.1)[:0], WIDTH, NoProgress())) == 0
+    assert len(join_centres(along(straight(rng), 0.1)[:0], NoProgress())) == 0

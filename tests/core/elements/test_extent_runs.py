@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore.elements.extent import find_extent, section_misfit
+from pipecore.elements.extent import find_extent, section_misfit, turning_by_row
 from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
@@ -13,15 +13,26 @@ RADIUS, NOISE, VOXEL = 0.1, 0.001, 0.01
 
 
 def wall_points(rng, low, high, arc=np.pi, spacing=VOXEL):
-    """Chainage, clock and residual of points of a pipe between two chainages."""
+    """Chainage, clock, residual and lean of points of a pipe between two chainages."""
     n = round((high - low) * arc * RADIUS / spacing**2)
     clock = rng.uniform(0, arc, n)
-    return rng.uniform(low, high, n), clock, NOISE * rng.normal(size=n)
+    lean = np.radians(5.0) * rng.normal(size=n)
+    return rng.uniform(low, high, n), clock, NOISE * rng.normal(size=n), lean
+
+
+def floor_points(rng, low, high):
+    """The same of the strip of floor that a pipe lies on, at 6:00."""
+    aside = 0.5 * RADIUS
+    n = round((high - low) * 2 * aside / VOXEL**2)
+    clock = np.pi + np.arctan(rng.uniform(-aside, aside, n) / RADIUS)
+    residual = RADIUS / -np.cos(clock) - RADIUS + NOISE * rng.normal(size=n)
+    lean = np.pi - clock + np.radians(5.0) * rng.normal(size=n)
+    return rng.uniform(low, high, n), clock, residual, lean
 
 
 def extent_of(*parts, length=1.0):
-    chainage, clock, residual = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return find_extent(chainage, clock, residual, length, RADIUS, VOXEL, NOISE)
+    chainage, clock, residual, lean = (np.concatenate(p) for p in zip(*parts, strict=True))
+    return find_extent(chainage, clock, residual, lean, length, RADIUS, VOXEL, NOISE)
 
 
 def test_that_the_extent_grows_to_where_the_points_end(rng):
@@ -46,16 +57,32 @@ def test_that_points_beyond_a_long_gap_are_of_something_else(rng):
 
 
 def test_that_the_pipe_ends_where_the_points_leave_its_surface(rng):
-    chainage, clock, residual = wall_points(rng, 0.0, 1.6)
+    chainage, clock, residual, lean = wall_points(rng, 0.0, 1.6)
     beyond = chainage > 1.2
     residual[beyond] += 0.05 * (chainage[beyond] - 1.2)
-    extent = extent_of((chainage, clock, residual))
+    extent = extent_of((chainage, clock, residual, lean))
     assert extent.high == pytest.approx(1.23, abs=0.06)
+
+
+def test_that_a_pipe_ends_where_only_the_floor_goes_on(rng):
+    # The floor touches the pipe's surface from below all along: near, but flat.
+    pipe, floor = wall_points(rng, 0.0, 1.0, arc=np.radians(240)), floor_points(rng, -1.0, 2.0)
+    chainage, clock, residual, lean = floor
+    near = np.abs(residual) < 0.012
+    extent = extent_of(pipe, (chainage[near], clock[near], residual[near], lean[near]))
+    assert (extent.low, extent.high) == pytest.approx((0.0, 1.0), abs=0.03)
+
+
+def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
+    for points, turning in ((wall_points(rng, 0, 1), 1.0), (floor_points(rng, 0, 1), 0.0)):
+        _, clock, _, lean = points
+        row = rng.integers(0, 2, len(clock))
+        assert_allclose(turning_by_row(clock, lean, row, 3), [turning, turning, 0.0], atol=0.1)
 
 
 def test_that_a_surface_without_points_has_no_extent(rng):
     nothing = np.empty(0)
-    assert find_extent(nothing, nothing, nothing, 1.0, RADIUS, VOXEL, NOISE) is None
+    assert find_extent(nothing, nothing, nothing, nothing, 1.0, RADIUS, VOXEL, NOISE) is None
     assert extent_of(wall_points(rng, 5.0, 6.0)) is None
 
 

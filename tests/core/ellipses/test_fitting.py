@@ -112,7 +112,7 @@ def test_that_cuts_flatter_than_the_gate_are_not_used(rng):
 
 def test_that_short_arcs_are_not_used_unless_they_carry_the_radius(rng):
     axis = LineAxis(np.zeros(3), random_direction(rng), 0.5)
-    for arc_deg, is_used in ((70.0, False), (110.0, True)):
+    for arc_deg, is_used in ((40.0, False), (110.0, True)):
         points = tube(rng, axis, R, noise=0.001, arc=np.radians(arc_deg))
         found = ellipses_of(known(points, noise=0.001), axis.direction)
         assert (len(found) >= 15) == is_used

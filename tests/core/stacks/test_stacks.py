@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.profiles import segment_profiles
 from pipecore.progress import NoProgress
-from pipecore.settings import DirectionPreset, Settings, StackSettings
+from pipecore.settings import DirectionPreset, ProfileSettings, Settings, StackSettings
 from pipecore.stacks import choose_stacks, preset_directions
 from pipecore.stacks.directions import cover_directions
 from pipecore.types import Stack
@@ -70,7 +71,28 @@ def test_that_the_automatic_width_follows_the_thinning(rng):
     for voxel_mm in (15.0, 30.0):
         surface = sampled(floor(rng), voxel_mm=voxel_mm)
         stacks = choose_stacks(surface, StackSettings(DirectionPreset.AXES), NoProgress())
-        assert [s.width for s in stacks] == pytest.approx([0.002 * voxel_mm] * 3)
+        narrow = [s.width for s in stacks if not s.min_spacing]
+        assert narrow == pytest.approx([0.002 * voxel_mm] * 3)
+
+
+def test_that_thinly_scanned_places_are_cut_again_by_wider_profiles(rng):
+    dense = plane(rng, np.zeros(3), [1, 0, 0], [0, 1, 0], 0.005, 0.001)
+    thin = plane(rng, np.array([0, 0, 2.0]), [1, 0, 0], [0, 1, 0], 0.025, 0.001)
+    surface = sampled(dense, thin)
+    stacks = choose_stacks(surface, StackSettings(DirectionPreset.AXES), NoProgress())
+    narrow, wide = stacks[:3], stacks[3:]
+    assert [s.stack_id for s in stacks] == [1, 2, 3, 4, 5, 6]
+    for one, other in zip(narrow, wide, strict=True):
+        assert_allclose(one.direction, other.direction)
+        assert other.width > 2 * one.width
+    is_inside = (np.abs(surface.xyz[:, :2] - 0.5) < 0.4).all(axis=1)
+    in_thin = is_inside & (surface.xyz[:, 2] > 1.0)
+    joined = np.zeros(len(is_inside), np.bool_)
+    joined[segment_profiles(surface, wide[0], ProfileSettings(), 1.0).points] = True
+    assert joined[in_thin].mean() > 0.5
+    assert joined[is_inside & ~in_thin].mean() < 0.01
+    given = StackSettings(DirectionPreset.AXES, width_mm=20.0)
+    assert len(choose_stacks(surface, given, NoProgress())) == 3
 
 
 def test_that_automatic_directions_are_the_axes_of_the_pipes(rng):
@@ -82,7 +104,7 @@ def test_that_automatic_directions_are_the_axes_of_the_pipes(rng):
     ]
     surface = sampled(*pipes, floor(rng))
     stacks = choose_stacks(surface, StackSettings(), NoProgress())
-    found = np.array([s.direction for s in stacks])
+    found = np.array([s.direction for s in stacks if not s.min_spacing])
     for d in true:
         assert np.degrees(angle_between(found, d).min()) < 3.0
     assert len(found) <= 6
@@ -112,7 +134,8 @@ def test_that_the_directions_of_a_bend_are_all_covered(rng):
 def test_that_a_scene_without_curved_surfaces_gets_the_axes_and_diagonals(rng):
     stacks = choose_stacks(sampled(floor(rng)), StackSettings(), NoProgress())
     assert_allclose(
-        [s.direction for s in stacks], preset_directions(DirectionPreset.AXES_AND_DIAGONALS)
+        [s.direction for s in stacks if not s.min_spacing],
+        preset_directions(DirectionPreset.AXES_AND_DIAGONALS),
     )
 
 
