@@ -189,7 +189,7 @@ class EllipseSettings:
         advanced=True,
     )
     min_arc_deg: float = setting(
-        45.0,
+        35.0,
         "Smallest arc",
         "Ellipses seen over less of their circumference are not used; below 80° only those "
         "whose points carry the radius.",

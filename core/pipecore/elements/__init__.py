@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 MIN_COVERAGE = 0.5
 """Share of an element's length that must be covered by points."""
 MIN_ARC, MIN_BEND_ARC = np.deg2rad(55.0), np.deg2rad(75.0)
+MIN_SHARP_ARC, VERY_SHARP_RADIUS_SD = np.deg2rad(36.0), 0.005
+"""A straight may show less than `MIN_ARC` where the points carry the radius to this share."""
 SURE_ARC, SHARP_RADIUS_SD, LONG_RADIUS_SD = np.deg2rad(100.0), 0.010, 0.035
 """On shorter arcs the points must carry the radius to this share of it, or to the latter ..."""
 LONG = 3.0
@@ -208,8 +210,11 @@ def is_credible(
     if isinstance(model, SphereSurface):
         return len(found.own) >= 60 and misfit < MAX_SPHERE_MISFIT * radius + 0.0003
     is_round = misfit < MAX_MISFIT * radius + MAX_NOISE_MISFIT * found.fit.sigma
-    is_seen = extent.coverage >= MIN_COVERAGE / slack and extent.arc >= MIN_ARC / slack
-    is_long = isinstance(model, LineSurface) and found.axis.length > LONG * radius
+    is_straight = isinstance(model, LineSurface)
+    is_very_sharp = is_straight and radius_sd < VERY_SHARP_RADIUS_SD * radius
+    least_arc = MIN_SHARP_ARC if is_very_sharp else MIN_ARC
+    is_seen = extent.coverage >= MIN_COVERAGE / slack and extent.arc >= least_arc / slack
+    is_long = is_straight and found.axis.length > LONG * radius
     sharp = LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
     is_sharp = extent.arc >= SURE_ARC or radius_sd < sharp * radius
     if not (is_round and is_seen and is_sharp):

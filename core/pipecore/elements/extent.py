@@ -13,6 +13,7 @@ MAX_GAP_LENGTH = 0.25
 SHOWN_GAP = 2.0
 """Gaps of at least this many radii are reported."""
 MIN_COVERED_ARC = float(np.deg2rad(50.0))
+"""... or 0.8 of what it usually shows."""
 SHARE_OF_ARC = 0.45
 """A step of axis is covered if it shows this share of the arc that the element usually shows."""
 MIN_TURNING = 0.4
@@ -98,7 +99,7 @@ def find_extent(
     # Half of normal residuals are below 0.67 sigma.
     off = _median_by_row(np.abs(residual), row, n_rows)
     is_covered = (
-        (arc >= max(SHARE_OF_ARC * usual_arc, MIN_COVERED_ARC))
+        (arc >= max(SHARE_OF_ARC * usual_arc, min(MIN_COVERED_ARC, 0.8 * usual_arc)))
         & (off < 1.2 * sigma + min(0.006 * radius, 0.0015))
         & (turning_by_row(clock, lean, row, n_rows) > MIN_TURNING)
     )
