@@ -117,6 +117,8 @@ def _take_lines(
     is_tapered: bool = False,
 ) -> list[Piece]:
     """Take straight pieces of at least `min_length` radii off the members, best first."""
+    if len(members) < MIN_ELLIPSES:
+        return []
     e = ellipses[members]
     width = float(np.median(e.width))
     free = np.ones(len(members), np.bool_)

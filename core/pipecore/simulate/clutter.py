@@ -184,15 +184,19 @@ def _valve(valve: Valve) -> list[Part]:
 
 
 def _person(person: Person) -> list[Part]:
-    """Legs, trunk, arms and head, smooth but of no constant radius."""
+    """Legs, trunk, arms and head: oval, in clothes that fold, of no constant radius."""
     foot, h = np.array(person.foot), person.height
     aside = yaw_axes(person.yaw_deg)[0]
     axis = LineAxis(foot, np.array([0.0, 0.0, 1.0]), h)
 
     def limb(offset: Array, heights: list[float], radii: list[float]) -> Mesh:
         at = LineAxis(axis.start + offset, axis.direction, h)
-        dense = np.linspace(heights[0], heights[-1], 24)
-        return tube(at, dense * h, np.interp(dense, heights, np.array(radii) * h), 24)
+        dense = np.linspace(heights[0], heights[-1], 60)
+        clock = 2 * np.pi * np.arange(36) / 36
+        oval = 1.0 + 0.12 * np.cos(2 * (clock - np.deg2rad(90.0 - person.yaw_deg)))
+        folds = 0.07 * np.sin(3 * clock + 60.0 * dense[:, None]) * np.sin(25.0 * dense[:, None])
+        radius = np.interp(dense, heights, np.array(radii) * h)
+        return tube(at, dense * h, radius[:, None] * (oval + folds), 36)
 
     legs = [
         limb(s * 0.055 * h * aside, [0, 0.02, 0.25, 0.48], [0.05, 0.03, 0.036, 0.055])

@@ -32,9 +32,9 @@ def pipe_parts(placement: Placement) -> list[Part]:
 
 
 def tube(axis: LineAxis, chainage: Array, radius: Array, n_facets: int) -> Mesh:
-    """Surface of revolution about a line through (chainage, radius) pairs."""
+    """Surface about a line through (chainage, radius) pairs; (n, n_facets) radii if not round."""
     s, a = np.meshgrid(chainage, 2 * np.pi * np.arange(n_facets) / n_facets, indexing="ij")
-    r = np.broadcast_to(radius[:, None], s.shape)
+    r = np.broadcast_to(radius if radius.ndim == 2 else radius[:, None], s.shape)
     points = surface_points(axis, s.ravel(), r.ravel(), a.ravel())
     return grid_mesh(points.reshape(*s.shape, 3), closed=True)
 

@@ -228,7 +228,7 @@ def test_that_the_help_names_units_bounds_and_defaults(capsys):
         run("detect", "--help")
     assert caught.value.code == 0
     words = re.sub(r"\s+", " ", capsys.readouterr().out)
-    assert "(30 to 360 °; default 80)" in words
+    assert "(30 to 360 °; default 35)" in words
     assert "(0 to 1000 mm; 0: automatic; default 0)" in words
     assert "(one of proximity, curve fitting; default curve fitting)" in words
     assert "(0.1 to 20 %; default 2)" in words

@@ -89,7 +89,8 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
     reaches = []
     for i, p in enumerate(sorted_xyz):
         distance = np.linalg.norm(xyz - p, axis=1)
-        reach = next((r for r in (1, 2, 4) if (distance <= r * radius).sum() >= 7), None)
+        steps = (1, 1.25, 1.5, 1.75, 2, 2.5, 3, 4)
+        reach = next((r for r in steps if (distance <= r * radius).sum() >= 7), None)
         reaches.append(reach)
         if reach is None:
             assert np.isnan([*normals[i], residuals[i], spacings[i]]).all()
@@ -99,7 +100,8 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
         assert abs(normals[i] @ vectors[:, 0]) == pytest.approx(1.0, abs=1e-6)
         assert residuals[i] == pytest.approx(np.sqrt(values[0] * len(near) / (len(near) - 3)))
         assert spacings[i] == pytest.approx(np.sqrt(np.pi * (reach * radius) ** 2 / len(near)))
-    assert {1, 4, None} <= set(reaches)
+    assert {1, None} < set(reaches)
+    assert max(r or 0 for r in reaches) >= 2
 
 
 def test_that_local_axes_are_those_of_all_normals_within_reach(rng):
