@@ -17,6 +17,10 @@ from pipecore.geometry import ArcAxis, LineAxis, unit
 Array = NDArray[np.float64]
 
 
+ONE_SIDED = 0.55
+"""Length of the mean of a surface's normals from which on it is seen from one side (200°)."""
+
+
 class SurfaceModel(Protocol):
     """A surface about an axis, with parameters that a fit can step."""
 
@@ -214,6 +218,11 @@ def robust_sigma(residuals: Array) -> float:
     return float(1.4826 * np.median(np.abs(residuals)))
 
 
+def _tukey_weights(residuals: Array, reach: float) -> Array:
+    """Weights that fall to zero at `reach`."""
+    return np.where(np.abs(residuals) < reach, (1 - (residuals / reach) ** 2) ** 2, 0.0)
+
+
 def fit_surface(
     model: Model, xyz: Array, scale: float, n_iterations: int = 30
 ) -> SurfaceFit[Model] | None:
@@ -236,7 +245,7 @@ def fit_surface(
     for _ in range(n_iterations):
         residual, jacobian, _ = model.residuals(xyz)
         reach = 4.685 * scale
-        weight = np.where(np.abs(residual) < reach, (1 - (residual / reach) ** 2) ** 2, 0.0)
+        weight = _tukey_weights(residual, reach)
         weighted = weight[:, None] * jacobian
         normal_matrix = jacobian.T @ weighted
         n_used = int((weight > 0).sum())
@@ -255,17 +264,60 @@ def fit_surface(
         scale = min(scale, max(shown, 0.7 * scale, 1e-5))
         if np.abs(jacobian @ step).max() < 1e-6 and change < 0.02 * scale:
             break
-    residual, jacobian, _ = model.residuals(xyz)
+    residual, jacobian, outward = model.residuals(xyz)
     reach = 4.685 * scale
     is_used = np.abs(residual) < reach
-    weight = np.where(is_used, (1 - (residual / reach) ** 2) ** 2, 0.0)
-    # Huber's covariance of an M-estimator.
-    ratio = (residual / reach) ** 2
-    slope = np.where(is_used, (1 - ratio) * (1 - 5 * ratio), 0.0)
     n, p = int(is_used.sum()), jacobian.shape[1]
     if n < 3 * p:
         return None
-    information = jacobian[is_used].T @ jacobian[is_used]
-    psi_square = float(((weight * residual) ** 2).sum()) / (n - p)
-    covariance = np.linalg.pinv(information) * psi_square / float(slope[is_used].mean()) ** 2
-    return SurfaceFit(model, covariance, robust_sigma(residual[is_used]), n)
+    residual, jacobian, outward = residual[is_used], jacobian[is_used], outward[is_used]
+    # Huber's covariance of an M-estimator; points need not all scatter alike.
+    ratio = (residual / reach) ** 2
+    pull = _tukey_weights(residual, reach) * residual
+    slope = float(((1 - ratio) * (1 - 5 * ratio)).mean())
+    inverse = np.linalg.pinv(slope * jacobian.T @ jacobian)
+    scatter = (pull[:, None] ** 2 * jacobian).T @ jacobian * (n / (n - p))
+    sigma = robust_sigma(residual)
+    on_surface = xyz[is_used] - residual[:, None] * outward
+    shift = inverse @ _beam_pull(model, on_surface, outward, sigma, reach)
+    return SurfaceFit(model.stepped(shift), inverse @ scatter @ inverse, sigma, n)
+
+
+def _beam_pull(
+    model: SurfaceModel, xyz: Array, outward: Array, sigma: float, reach: float
+) -> Array:
+    """What noise along the laser's beam adds to the normal equations, on average.
+
+    A point that is moved along its beam moves across the surface and along it at once, so
+    that its distance from the surface and the place where that is counted go together. On a
+    pipe seen from one side the fitted radius is too small by about σ²/r for it, however
+    many points there are. Here points on the surface are moved by one standard deviation
+    of the noise either way, which gives the mean for a normal distribution up to the third
+    order. The beam is the mean direction in which the surface faces; where the surface
+    is seen all round, the effect cancels and nothing is done.
+
+    Parameters
+    ----------
+    model : SurfaceModel
+    xyz, outward : ndarray, shape (n, 3)
+        Points on the surface and its normals there.
+    sigma, reach : float
+        Standard deviation of the points' distances from the surface; that from which on they
+        do not count; metres.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Σ Jᵀ·residual, to be taken off.
+    """
+    beam = outward.mean(axis=0)
+    one_sidedness = float(np.linalg.norm(beam))
+    if one_sidedness < ONE_SIDED:
+        return np.zeros(len(model.residuals(xyz[:1])[1][0]))
+    beam /= one_sidedness
+    noise = sigma / np.sqrt(np.mean((outward @ beam) ** 2))
+    total = 0.0
+    for moved in (xyz + noise * beam, xyz - noise * beam):
+        residual, jacobian, _ = model.residuals(moved)
+        total = total + 0.5 * jacobian.T @ (_tukey_weights(residual, reach) * residual)
+    return np.asarray(total)
