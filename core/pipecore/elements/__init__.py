@@ -338,7 +338,7 @@ def _numbered(
                 kind=kinds[i],
                 axis=axes[i],
                 radius=start_radius,
-                radius_sd=found.fit.radius_sd,
+                radius_sd=found.radius_sd,
                 radius_end=end_radius,
                 centre=np.full(3, np.nan) if isinstance(model, LineSurface) else model.centre,
                 n_points=0,

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.extent import Extent, find_extent, section_misfit, sphere_misfit
+from pipecore.elements.extent import (
+    MAX_SECTORS,
+    Extent,
+    find_extent,
+    section_misfit,
+    sphere_misfit,
+)
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_direction
 from pipecore.elements.surfaces import (
@@ -17,6 +23,7 @@ from pipecore.elements.surfaces import (
     SurfaceFit,
     fit_surface,
 )
+from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.surface import Surface
 
@@ -55,6 +62,19 @@ class Fitted:
     own: Indices
     extent: Extent
     misfit: float
+
+    @property
+    def radius_sd(self) -> float:
+        """Standard deviation of the radius: the fit's, and what is off the round section.
+
+        Sectors that leave circle and oval by more than noise does are as many wrong
+        measurements of the radius as there are sectors; metres.
+        """
+        n_sectors = max(self.extent.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
+        by_noise = 0.5 * np.pi * self.fit.sigma**2 * n_sectors / max(len(self.own), 1)
+        excess = max(self.misfit**2 - by_noise, 0.0)
+        factor = float(radius_sd_factor(self.extent.arc))
+        return float(np.hypot(self.fit.radius_sd, factor * np.sqrt(excess / n_sectors)))
 
     @property
     def radii(self) -> tuple[float, float]:

@@ -17,6 +17,8 @@ from pipecore.geometry import ArcAxis, LineAxis, unit
 Array = NDArray[np.float64]
 
 
+NORMAL_STEPS = np.array([-2.334, -0.742, 0.742, 2.334]), np.array([0.0459, 0.4541, 0.4541, 0.0459])
+"""Nodes and weights of Gauss and Hermite's quadrature for the standard normal distribution."""
 ONE_SIDED = 0.55
 """Length of the mean of a surface's normals from which on it is seen from one side (200°)."""
 
@@ -279,31 +281,32 @@ def fit_surface(
     scatter = (pull[:, None] ** 2 * jacobian).T @ jacobian * (n / (n - p))
     sigma = robust_sigma(residual)
     on_surface = xyz[is_used] - residual[:, None] * outward
-    shift = inverse @ _beam_pull(model, on_surface, outward, sigma, reach)
+    shift = inverse @ _beam_pull(model, on_surface, outward, residual, reach)
     return SurfaceFit(model.stepped(shift), inverse @ scatter @ inverse, sigma, n)
 
 
 def _beam_pull(
-    model: SurfaceModel, xyz: Array, outward: Array, sigma: float, reach: float
+    model: SurfaceModel, xyz: Array, outward: Array, residuals: Array, reach: float
 ) -> Array:
     """What noise along the laser's beam adds to the normal equations, on average.
 
     A point that is moved along its beam moves across the surface and along it at once, so
     that its distance from the surface and the place where that is counted go together. On a
     pipe seen from one side the fitted radius is too small by about σ²/r for it, however
-    many points there are. Here points on the surface are moved by one standard deviation
-    of the noise either way, which gives the mean for a normal distribution up to the third
-    order. The beam is the mean direction in which the surface faces; where the surface
-    is seen all round, the effect cancels and nothing is done.
+    many points there are. Here points on the surface are moved along the beam, and the
+    mean is taken over normal noise by Gauss and Hermite's quadrature. The beam is the mean
+    direction in which the surface faces; where the surface is seen all round, the effect
+    cancels and nothing is done.
 
     Parameters
     ----------
     model : SurfaceModel
     xyz, outward : ndarray, shape (n, 3)
         Points on the surface and its normals there.
-    sigma, reach : float
-        Standard deviation of the points' distances from the surface; that from which on they
-        do not count; metres.
+    residuals : ndarray, shape (n,)
+        The measured points' distances from the surface, metres.
+    reach : float
+        Distance from which on points do not count, metres.
 
     Returns
     -------
@@ -312,12 +315,15 @@ def _beam_pull(
     """
     beam = outward.mean(axis=0)
     one_sidedness = float(np.linalg.norm(beam))
+    n_parameters = model.residuals(xyz[:1])[1].shape[1]
     if one_sidedness < ONE_SIDED:
-        return np.zeros(len(model.residuals(xyz[:1])[1][0]))
+        return np.zeros(n_parameters)
     beam /= one_sidedness
-    noise = sigma / np.sqrt(np.mean((outward @ beam) ** 2))
-    total = 0.0
-    for moved in (xyz + noise * beam, xyz - noise * beam):
-        residual, jacobian, _ = model.residuals(moved)
-        total = total + 0.5 * jacobian.T @ (_tukey_weights(residual, reach) * residual)
-    return np.asarray(total)
+    facing = outward @ beam
+    is_faced = facing > 0.3
+    noise = robust_sigma(residuals[is_faced] / facing[is_faced])
+    pull = np.zeros(n_parameters)
+    for step, share in zip(*NORMAL_STEPS, strict=True):
+        residual, jacobian, _ = model.residuals(xyz + step * noise * beam)
+        pull += share * jacobian.T @ (_tukey_weights(residual, reach) * residual)
+    return pull
