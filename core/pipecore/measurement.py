@@ -9,7 +9,7 @@ from pipecore.deformation import find_deformations
 from pipecore.elements import BuiltElements, NearbyPoints
 from pipecore.elements.sections import cut_normal_stack
 from pipecore.progress import Progress
-from pipecore.settings import DeformationSettings
+from pipecore.settings import DeformationSettings, EllipseFit
 from pipecore.types import NO_ID, Deformation, Element, Profiles
 
 
@@ -43,6 +43,7 @@ def measure_elements(
     n_points: int,
     width: float,
     settings: DeformationSettings,
+    fit: EllipseFit,
     progress: Progress,
 ) -> Measurement:
     """Measure every element on all points around it."""
@@ -68,8 +69,17 @@ def measure_elements(
         closer = ~taken | (np.abs(finding.deviation[finding.belongs]) < np.abs(deviation[own]))
         element_id[own[closer]] = element.element_id
         deviation[own[closer]] = finding.deviation[finding.belongs][closer]
-        section_width = max(width, 0.1 * element.radius)
-        rows = cut_normal_stack(element, xyz[finding.belongs], section_width, nearby.surface.voxel)
+        spacing = nearby.usual_spacing(thinned)
+        section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
+        share = (i + 0.5) / len(built.elements)
+        rows = cut_normal_stack(
+            element,
+            xyz[finding.belongs],
+            section_width,
+            spacing,
+            fit,
+            lambda share=share: progress.update("deformations", share),  # type: ignore[misc]
+        )
         elements.append(
             replace(
                 element,

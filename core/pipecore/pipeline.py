@@ -92,7 +92,13 @@ def detect(
         profiles = tabulate_ellipses(built.elements, ellipses)
     with _timed(seconds, "deformations"):
         measured = measure_elements(
-            built, nearby, len(cloud), stacks[0].width, settings.deformation, progress
+            built,
+            nearby,
+            len(cloud),
+            stacks[0].width,
+            settings.deformation,
+            settings.ellipses.fit,
+            progress,
         )
         deformations = judge_deformations(measured.deformations, measured.elements, rule)
     return Result(

@@ -48,6 +48,14 @@ class ProfileMethod(StrEnum):
     CURVE_FITTING = "curve fitting"
 
 
+class EllipseFit(StrEnum):
+    """How a free ellipse is fitted (paper, section 3.3.3)."""
+
+    DIRECT = "direct"
+    NONLINEAR = "nonlinear"
+    ROBUST = "robust"
+
+
 class SizeCatalogue(StrEnum):
     """Where nominal sizes come from."""
 
@@ -178,8 +186,15 @@ class ProfileSettings:
 
 @dataclass(frozen=True)
 class EllipseSettings:
-    """Which curves count as ellipses."""
+    """How ellipses are fitted, and which curves count as one."""
 
+    fit: EllipseFit = setting(
+        EllipseFit.DIRECT,
+        "Free ellipses",
+        "Where the points cover 240° or more, ellipses are fitted freely: directly (fast), by "
+        "true distances, or by true distances with outliers weighed down (both slow).",
+        advanced=True,
+    )
     max_flattening: float = setting(
         1 - 1 / math.sqrt(2),
         "Largest flattening",

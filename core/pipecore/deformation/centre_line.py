@@ -16,6 +16,8 @@ MAX_KINK_SHARE = 0.6
 MIN_KINK = np.deg2rad(0.3)
 MIN_BOW_RATIO = 0.001
 """A pipe counts as bowed from 3.2 mm in 3 m (ASTM A999)."""
+LEAST_SD = 1e-6
+"""No centre is known better, metres; rounding can bring a variance below zero."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def measure_centre_line(contour: Contour) -> CentreLine:
     # The chord's ends are as uncertain as the peak: add their shares.
     share = (s[peak] - s[0]) / (s[-1] - s[0])
     covariance = contour.term_covariance[inner, 1:3, 1:3]
-    variance = [float(side @ covariance[i] @ side) for i in (peak, 0, -1)]
+    variance = [max(float(side @ covariance[i] @ side), LEAST_SD**2) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
     shape = _shape_of(s, deviation @ side, covariance, side)
@@ -82,7 +84,8 @@ def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shap
     s, lateral = s[::step], lateral[::step]
     if len(s) < 8:
         return _Shape(0.0, None)
-    sd = np.sqrt(np.einsum("k,rkl,l->r", side, covariance[::step], side))
+    variance = np.einsum("k,rkl,l->r", side, covariance[::step], side)
+    sd = np.sqrt(np.maximum(variance, LEAST_SD**2))
     x = (s - s[0]) / (s[-1] - s[0])
 
     def chi2(columns: list[Array]) -> tuple[float, Array]:

@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
-from pipecore.elements.fittings import End, propose_bends, propose_flanges, propose_reducers
+from pipecore.elements.fittings import (
+    End,
+    flanges,
+    propose_bends,
+    propose_flanges,
+    propose_reducers,
+)
 from pipecore.elements.joining import join_straights
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import LONG_PIECE, Piece, find_pieces
@@ -45,9 +51,6 @@ MIN_LENGTH = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
 WIDE, WHOLE_ARC, MIN_WIDE_LENGTH = 0.18, np.deg2rad(200.0), 0.6
 """Wide cylinders that are not seen all round are longer than this many radii: heads are not."""
-FLANGE_RATIO = (1.12, 2.8)
-FLANGE_LENGTH = 0.9
-"""A flange is a disc, shorter than this many of its radii, around a thinner pipe."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,33 +279,6 @@ def _trimmed(
         line, arc = trim_to_tangent(b, end_b, a, end_a, 2.0 * radius)
         return arc, line
     return a, b
-
-
-def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
-    """Pairs (flange, pipe): short discs around the axis of a thinner pipe, at or on it."""
-    pipes = [
-        (j, f)
-        for j, f in enumerate(fitted)
-        if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered
-    ]
-    found = []
-    for i, disc in pipes:
-        if disc.axis.length > FLANGE_LENGTH * disc.fit.model.radius:
-            continue
-        for j, pipe in pipes:
-            ratio = disc.fit.model.radius / pipe.fit.model.radius
-            if i == j or not FLANGE_RATIO[0] < ratio < FLANGE_RATIO[1]:
-                continue
-            if pipe.axis.length < pipe.fit.model.radius:
-                continue
-            chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
-            turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
-            reach = 2 * pipe.fit.model.radius
-            near = -reach < chainage[0] < pipe.axis.length + reach
-            if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):
-                found.append((i, j))
-                break
-    return found
 
 
 def _numbered(

@@ -160,9 +160,10 @@ def propose_reducers(fitted: list[Fitted]) -> Iterator[tuple[Piece, tuple[End, E
             yield Piece(model, NO_ELLIPSES, -0.5 * length, 0.5 * length), (i, j)
 
 
-FLANGE_RATIO = (1.15, 2.7)
-FLANGE_LENGTH = (0.008, 0.9)
-"""Shortest flange in metres, longest in radii of the pipe."""
+FLANGE_RATIO = (1.12, 2.8)
+"""A flange is this many times as wide as its pipe."""
+MIN_FLANGE_LENGTH, MAX_FLANGE_LENGTH = 0.008, 0.9
+"""Metres; radii of the pipe for proposed ones, of the disc itself for found ones."""
 FLANGE_ARC = np.deg2rad(75.0)
 RADIUS_STEP = 0.03
 
@@ -233,5 +234,32 @@ def _rings(
         is_ring[max(first - 1, 0) : last + 2] = False
         members = (row >= first) & (row <= last) & ((level == l0) | (level == l0 - 1))
         low, high = float(chainage[members].min()), float(chainage[members].max())
-        if FLANGE_LENGTH[0] <= high - low <= FLANGE_LENGTH[1] * radius and members.sum() >= 12:
+        if MIN_FLANGE_LENGTH <= high - low <= MAX_FLANGE_LENGTH * radius and members.sum() >= 12:
             yield low, high, float(np.median(rho[members]))
+
+
+def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
+    """Pairs (flange, pipe): short discs around the axis of a thinner pipe, at or on it."""
+    pipes = [
+        (j, f)
+        for j, f in enumerate(fitted)
+        if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered
+    ]
+    found = []
+    for i, disc in pipes:
+        if disc.axis.length > MAX_FLANGE_LENGTH * disc.fit.model.radius:
+            continue
+        for j, pipe in pipes:
+            ratio = disc.fit.model.radius / pipe.fit.model.radius
+            if i == j or not FLANGE_RATIO[0] < ratio < FLANGE_RATIO[1]:
+                continue
+            if pipe.axis.length < pipe.fit.model.radius:
+                continue
+            chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
+            turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
+            reach = 2 * pipe.fit.model.radius
+            near = -reach < chainage[0] < pipe.axis.length + reach
+            if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):
+                found.append((i, j))
+                break
+    return found

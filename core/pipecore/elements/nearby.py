@@ -42,6 +42,12 @@ class NearbyPoints:
         inside = (rho > INNER * radius) & (rho < OUTER * radius)
         return found[inside & (chainage > -margin) & (chainage < axis.length + margin)]
 
+    def usual_spacing(self, thinned: NDArray[np.intp]) -> float:
+        """Distance between neighbours among some thinned points, not below the thinning's."""
+        if len(thinned) == 0:
+            return self.surface.voxel
+        return max(self.surface.voxel, float(np.nanmedian(self.surface.spacing[thinned])))
+
     def within_ball(self, centre: Array, radius: float) -> NDArray[np.intp]:
         """Thinned points within `radius` of a place, in order."""
         return np.sort(np.asarray(self._tree.query_ball_point(centre, radius), np.intp))

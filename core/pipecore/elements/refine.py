@@ -25,7 +25,6 @@ from pipecore.elements.surfaces import (
 )
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, LineAxis
-from pipecore.surface import Surface
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -124,7 +123,7 @@ def refine_piece(
         thinned = thinned[is_free[thinned]]
         near = _points_on(model, thinned, nearby, sigma)
         chainage, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
-        spacing = _usual_spacing(nearby.surface, near.own)
+        spacing = nearby.usual_spacing(near.own)
         lean = _lean(nearby.surface.normals[near.own], near.outward, axis.tangent(chainage))
         extent = find_extent(
             chainage, clock, near.residual, lean,
@@ -208,11 +207,6 @@ def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
     if len(rows) <= limit:
         return rows
     return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
-
-
-def _usual_spacing(surface: Surface, own: Indices) -> float:
-    """Distance between neighbours among some points, not below the thinning's, metres."""
-    return max(surface.voxel, float(np.median(surface.spacing[own]))) if len(own) else np.nan
 
 
 def _lean(normals: Array, outward: Array, tangent: Array) -> Array:

@@ -1,5 +1,7 @@
 """Profiles of elements: the normal stack across each one's own axis, and the stacks' ellipses."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,10 +13,11 @@ from pipecore.ellipses import (
     LINE_PARAMETERS,
     Ellipses,
     akaike,
-    fit_direct_ellipses,
+    fit_free_ellipses,
     line_rss,
     radius_sd_factor,
 )
+from pipecore.settings import EllipseFit
 from pipecore.types import OWN_STACK, Element, Profiles
 
 Array = NDArray[np.float64]
@@ -24,7 +27,14 @@ ELLIPSE_SD_FACTOR = 2.4
 """Standard deviation of a free ellipse's axis at 240° of arc, in units of σ/√n."""
 
 
-def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float) -> Profiles:
+def cut_normal_stack(
+    element: Element,
+    xyz: Array,
+    width: float,
+    spacing: float,
+    fit: EllipseFit = EllipseFit.DIRECT,
+    check: Callable[[], None] = lambda: None,
+) -> Profiles:
     """Cut an element's points into profiles across its own axis and fit each.
 
     Parameters
@@ -37,13 +47,17 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
     spacing : float
         Distance between neighbouring points, metres; wider gaps around the axis are not
         counted as seen.
+    fit : EllipseFit
+        How free ellipses are fitted.
+    check : callable
+        Called between slow fits; may raise to cancel.
 
     Returns
     -------
     Profiles
         One row per profile with at least eight points and a circle, `stack_id` is
-        `OWN_STACK`. Semi-axes and ovality are those of the free direct ellipse where the
-        points cover 240° or more. On shorter arcs that fit collapses and even a free
+        `OWN_STACK`. Semi-axes and ovality are those of the free ellipse where the points
+        cover 240° or more and carry one. On shorter arcs that fit collapses and even a free
         circle follows a dent outwards, so there the ellipse is the circle about the
         element's axis, and the ovality not measurable.
     """
@@ -69,10 +83,11 @@ def cut_normal_stack(element: Element, xyz: Array, width: float, spacing: float)
         np.ascontiguousarray(up_right[:, 0]), np.ascontiguousarray(up_right[:, 1]),
         starts, 4.0 * spacing, fits,
     )  # fmt: skip
-    free = fit_direct_ellipses(up_right, starts)
     n_points = np.diff(starts)
     radius, rms, arc = fits[:, 2], fits[:, 3], fits[:, 4]
-    is_free = (arc >= FREE_FIT_ARC) & np.isfinite(free.semi_minor) & (n_points >= 12)
+    is_long = (arc >= FREE_FIT_ARC) & (n_points >= 12)
+    free = fit_free_ellipses(up_right, starts, is_long, fit, check)
+    is_free = is_long & np.isfinite(free.semi_minor)
     about_axis = np.add.reduceat(rho, starts[:-1]) / n_points
     semi_minor = np.where(is_free, free.semi_minor, about_axis)
     semi_major = np.where(is_free, free.semi_major, about_axis)

@@ -1,6 +1,6 @@
 """Ellipses of the curves in the profiles, and which of them to believe (paper, 3.3.3 and 3.3.4)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import ellipses as kernels
 from pipecore.ellipses.direct import PlaneEllipses, fit_direct_ellipses
+from pipecore.ellipses.free import fit_free_ellipses
 from pipecore.ellipses.uncertainty import radius_sd_factor
 from pipecore.parallel import for_chunks
 from pipecore.profiles import Curves
 from pipecore.progress import Progress
-from pipecore.settings import ElementSettings, EllipseSettings
+from pipecore.settings import ElementSettings, EllipseFit, EllipseSettings
 from pipecore.surface import Surface
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "akaike",
     "fit_direct_ellipses",
     "fit_ellipses",
+    "fit_free_ellipses",
     "radius_sd_factor",
 ]
 
@@ -119,7 +121,7 @@ def fit_ellipses(
     a line.
     """
     fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
-    tolerance = max(0.25 * surface.voxel, 3.0 * surface.noise, 0.002)
+    tolerance = surface.tolerance
 
     def work(start: int, stop: int) -> None:
         kernels.fit_curves(
@@ -146,11 +148,14 @@ def fit_ellipses(
         )
     kept = np.flatnonzero(accepted)
     fits = fits[kept]
-    line_rss, free = _competing_fits(curves, kept)
+    is_long = fits[:, 7] >= FREE_FIT_ARC
+    line_rss, free = _competing_fits(
+        curves, kept, is_long, settings.fit, lambda: progress.update("ellipses", span[1])
+    )
     n_points = np.diff(curves.starts)[kept]
     aic_line = akaike(LINE_PARAMETERS, n_points, line_rss)
     circle_rss = fits[:, 6] ** 2 * n_points
-    is_free = (fits[:, 7] >= FREE_FIT_ARC) & np.isfinite(free.semi_minor)
+    is_free = is_long & np.isfinite(free.semi_minor)
     aic_ellipse = np.where(
         is_free,
         akaike(ELLIPSE_PARAMETERS, n_points, free.rss),
@@ -168,7 +173,13 @@ MAX_OFF_AXIS = 0.35
 """Largest ratio of the two smaller eigenvalues of Σnnᵀ: above, the axis is not defined."""
 
 
-def _competing_fits(curves: Curves, kept: NDArray[np.intp]) -> tuple[Array, PlaneEllipses]:
+def _competing_fits(
+    curves: Curves,
+    kept: NDArray[np.intp],
+    is_long: NDArray[np.bool_],
+    method: EllipseFit,
+    check: Callable[[], None],
+) -> tuple[Array, PlaneEllipses]:
     """Residual sums of squares of a line, and free ellipses, for the kept curves."""
     if len(kept) == 0:
         return np.empty(0), PlaneEllipses(np.empty((0, 2)), *(np.empty(0) for _ in range(4)))
@@ -176,7 +187,7 @@ def _competing_fits(curves: Curves, kept: NDArray[np.intp]) -> tuple[Array, Plan
     starts = np.concatenate([[0], np.cumsum(sizes)])
     rows = np.arange(starts[-1]) + np.repeat(curves.starts[kept] - starts[:-1], sizes)
     uv = curves.uv[rows]
-    return line_rss(uv, starts), fit_direct_ellipses(uv, starts)
+    return line_rss(uv, starts), fit_free_ellipses(uv, starts, is_long, method, check)
 
 
 def line_rss(points: Array, starts: NDArray[np.int64]) -> Array:

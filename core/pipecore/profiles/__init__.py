@@ -129,7 +129,7 @@ def segment_profiles(
     reach = np.full(len(points), gap)
     if not settings.gap_mm:
         reach = np.clip(GAP_IN_SPACINGS * surface.spacing[points], gap, 4 * gap)
-    tolerance = _tolerance(surface)
+    tolerance = surface.tolerance
 
     # Sort by profile and by cell within it, row by row, with empty margins between.
     cell_uv = np.floor((uv - uv.min(axis=0)) / gap).astype(np.int64)
@@ -169,11 +169,6 @@ def segment_profiles(
         np.repeat(curves.profile_index, np.diff(curves.starts)),
         curves.curve_of_point * (MAX_PIECES + 1) + piece,
     )  # fmt: skip
-
-
-def _tolerance(surface: Surface) -> float:
-    """Distance within which thinned points count as being on their curve, metres."""
-    return max(0.25 * surface.voxel, 3.0 * surface.noise, 0.002)
 
 
 def _group(

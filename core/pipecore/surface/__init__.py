@@ -53,6 +53,11 @@ class Surface:
     voxel: float
     noise: float
 
+    @property
+    def tolerance(self) -> float:
+        """Distance within which points count as being on their curve, metres."""
+        return max(0.25 * self.voxel, 3.0 * self.noise, 0.002)
+
 
 def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
     """Fit a plane to the neighbourhood of every thinned point."""
