@@ -11,6 +11,7 @@ from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMainWindow, QMenu
 
 from pipegui import theme
+from pipegui.command_search import Entry
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,13 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     ),
     "Help": (
         _A("demo", "Try the demo", "Open the demo scan", "play-circle-outline"),
+        _A(
+            "search_actions",
+            "Search actions…",
+            "Find an action by its name",
+            "magnify",
+            "Ctrl+Shift+P",
+        ),
         _A("shortcuts", "Keyboard shortcuts", "List all keys", "keyboard-outline", "F1"),
         _SEPARATOR,
         _A("about", "About PipeGUI", "Version and licences", "information-outline"),
@@ -167,6 +175,15 @@ class Actions:
 
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]
+
+    def entries(self) -> list[Entry]:
+        """All actions with the names of their menus."""
+        return [
+            Entry(self._actions[spec.name], menu)
+            for menu, specs in MENUS.items()
+            for spec in specs
+            if spec is not None
+        ]
 
     def refresh_icons(self) -> None:
         """Draw the icons in the colours of the current scheme."""

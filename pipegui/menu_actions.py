@@ -14,6 +14,7 @@ from pipecore.resources import resource
 from pipecore.settings import Settings
 from pipegui import commands, files
 from pipegui.actions import SPECS
+from pipegui.command_search import CommandSearch
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -27,6 +28,7 @@ class MenuActions:
     def __init__(self, window: "MainWindow") -> None:
         self._window = window
         self._recent_menu: QMenu | None = None
+        self._search: CommandSearch | None = None
 
     # Opening
 
@@ -131,6 +133,12 @@ class MenuActions:
             window.panels.message.tell(f"Saved “{path}”.")
 
     # Help
+
+    def search_actions(self) -> None:
+        """Let the user find an action by its name."""
+        if self._search is None:
+            self._search = CommandSearch(self._window, self._window.actions_.entries)
+        self._search.open()
 
     def show_shortcuts(self) -> None:
         """List the keys of all actions."""

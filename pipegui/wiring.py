@@ -35,6 +35,7 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "export_report": menu.export_report,
         "export_picture": menu.export_picture,
         "demo": menu.open_demo,
+        "search_actions": menu.search_actions,
         "shortcuts": menu.show_shortcuts,
         "about": menu.show_about,
     }
