@@ -19,6 +19,8 @@ SHARE_OF_ARC = 0.45
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
+MIN_NARROWER_ARC = float(np.deg2rad(75.0))
+"""A dent shows less of an arc inside the surface than a narrower pipe does."""
 LONGEST_STEP = 0.03
 """Ends of wide vessels are to be found as well as those of pipes, metres."""
 
@@ -51,6 +53,7 @@ def find_extent(
     clock: Array,
     residual: Array,
     lean: Array,
+    inside: tuple[Array, Array],
     length: float,
     radius: float,
     spacing: float,
@@ -61,7 +64,9 @@ def find_extent(
     A step of axis is covered if points lie around enough of it, most of them on the
     surface, and their normals turn with the clock: where a bend, a reducer or a flange
     takes over, the residuals grow together; where a pipe leaves the floor that it lies
-    on, the strip of floor below its axis is as near, but flat.
+    on, the strip of floor below its axis is as near, but flat. Across a gap in which
+    something round shows inside the surface it does not go on: between two flanges is
+    their pipe.
 
     Parameters
     ----------
@@ -69,6 +74,8 @@ def find_extent(
         Of the points near the surface.
     lean : ndarray, shape (n,)
         Angle from the surface's normal to each point's own, towards increasing clock.
+    inside : tuple of ndarray, each of shape (m,)
+        Chainage and clock of points well inside the surface that face as it does.
     length : float
         The proposed extent is chainage 0 … `length`.
     radius, spacing, sigma : float
@@ -107,7 +114,11 @@ def find_extent(
     if not is_covered[is_core].any():
         return None
     longest_gap = max(MAX_GAP * radius, MAX_GAP_LENGTH)
-    parts = np.split(covered, np.flatnonzero(np.diff(covered) * step > longest_gap) + 1)
+    seen_inside = _seen_by_row(*inside, base, step, n_rows).cumsum(axis=0)
+    in_gaps = seen_inside[covered[1:] - 1] > seen_inside[covered[:-1]]
+    arc_in_gaps = in_gaps.sum(axis=1) * (2 * np.pi / MAX_SECTORS)
+    ends = (np.diff(covered) * step > longest_gap) | (arc_in_gaps > MIN_NARROWER_ARC)
+    parts = np.split(covered, np.flatnonzero(ends) + 1)
     part = max(parts, key=lambda p: int(is_core[p].sum()))
     first, last = int(part[0]), int(part[-1])
     breaks = np.flatnonzero((np.diff(part) - 1) * step > SHOWN_GAP * radius)
@@ -118,6 +129,18 @@ def find_extent(
         len(part) / (last - first + 1),
         tuple((base + (part[b] + 1) * step, base + part[b + 1] * step) for b in breaks),
     )
+
+
+def _seen_by_row(
+    chainage: Array, clock: Array, base: float, step: float, n_rows: int
+) -> NDArray[np.int_]:
+    """Whether each sector of each row holds a point, 0 or 1, shape (n_rows, sectors)."""
+    row = np.floor((chainage - base) / step).astype(np.intp)
+    there = (row >= 0) & (row < n_rows)
+    seen = np.zeros((n_rows, MAX_SECTORS), np.int_)
+    sector = (clock[there] / (2 * np.pi) * MAX_SECTORS).astype(np.intp) % MAX_SECTORS
+    seen[row[there], sector] = 1
+    return seen
 
 
 def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int) -> Array:

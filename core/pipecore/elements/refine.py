@@ -34,6 +34,8 @@ RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
 """A point belongs to a surface only if its normal is this close to the surface's."""
 MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 4_000
 """Larger elements are fitted to an even sample of this many points; fewer in early rounds."""
+INSIDE = 0.1
+"""Points are well inside a surface from this share of its radius on."""
 MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
 N_ROUNDS = 3
@@ -120,27 +122,28 @@ def refine_piece(
             return None
         margin = _margin(axis, model.radius, round_)
         thinned = nearby.thinned(axis, model.radius, margin)
-        thinned = thinned[is_free[thinned]]
-        near = _points_on(model, thinned, nearby, sigma)
+        near = _points_on(model, thinned[is_free[thinned]], nearby, sigma)
+        inside = _points_inside(model, thinned, nearby)
+        inside_chainage, _, inside_clock = axis.pipe_coordinates(inside)
         chainage, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
         spacing = nearby.usual_spacing(near.own)
         lean = _lean(nearby.surface.normals[near.own], near.outward, axis.tangent(chainage))
         extent = find_extent(
-            chainage, clock, near.residual, lean,
+            chainage, clock, near.residual, lean, (inside_chainage, inside_clock),
             axis.length, model.radius, spacing, sigma,
         )  # fmt: skip
         if extent is None:
             return None
-        inside = (chainage >= extent.low) & (chainage <= extent.high)
+        within = (chainage >= extent.low) & (chainage <= extent.high)
         # Near the ends other surfaces begin, so the fit stays clear of them.
         clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
         core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
-        chosen = near.own[core if core.sum() > 30 else inside]
+        chosen = near.own[core if core.sum() > 30 else within]
         fit = _fit_to(model, chosen, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
-        misfit = section_misfit(clock[inside], near.residual[inside], extent.arc)
-        fitted = Fitted(fit, axis, near.own[inside], extent, misfit)
+        misfit = section_misfit(clock[within], near.residual[within], extent.arc)
+        fitted = Fitted(fit, axis, near.own[within], extent, misfit)
         model = fit.model
         axis = _axis_through(model, axis.at(np.array([extent.low, extent.high])))
         sigma = max(fit.sigma, 0.0005)
@@ -200,6 +203,16 @@ def _points_on(
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
     on = (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
     return _Near(thinned[on], residual[on], outward[on])
+
+
+def _points_inside(
+    model: LineSurface | ArcSurface, thinned: Indices, nearby: NearbyPoints
+) -> Array:
+    """Thinned points well inside a surface with normals like its own."""
+    xyz = nearby.surface.xyz[thinned]
+    residual, _, outward = model.residuals(xyz)
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
+    return np.asarray(xyz[(residual < -INSIDE * model.radius) & (cosine > RADIAL_COS)])
 
 
 def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:

@@ -30,9 +30,12 @@ def floor_points(rng, low, high):
     return rng.uniform(low, high, n), clock, residual, lean
 
 
-def extent_of(*parts, length=1.0):
+NOTHING = np.empty(0), np.empty(0)
+
+
+def extent_of(*parts, length=1.0, inside=NOTHING):
     chainage, clock, residual, lean = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return find_extent(chainage, clock, residual, lean, length, RADIUS, VOXEL, NOISE)
+    return find_extent(chainage, clock, residual, lean, inside, length, RADIUS, VOXEL, NOISE)
 
 
 def test_that_the_extent_grows_to_where_the_points_end(rng):
@@ -64,6 +67,17 @@ def test_that_the_pipe_ends_where_the_points_leave_its_surface(rng):
     assert extent.high == pytest.approx(1.23, abs=0.06)
 
 
+def test_that_two_flanges_are_not_one_pipe_with_a_gap_but_a_dented_pipe_is_one(rng):
+    one, other = wall_points(rng, 0.0, 0.06), wall_points(rng, 0.12, 0.17)
+    narrower = wall_points(rng, 0.05, 0.13)[:2]
+    assert extent_of(one, other, length=0.17).high == pytest.approx(0.17, abs=0.02)
+    assert extent_of(one, other, length=0.17, inside=narrower).high < 0.08
+    # The middle of a dent lies inside too, but around less of the pipe.
+    dent = wall_points(rng, 0.45, 0.55, arc=np.radians(50))[:2]
+    halves = wall_points(rng, 0.0, 0.45), wall_points(rng, 0.55, 1.0)
+    assert extent_of(*halves, inside=dent).high == pytest.approx(1.0, abs=0.02)
+
+
 def test_that_a_pipe_ends_where_only_the_floor_goes_on(rng):
     # The floor touches the pipe's surface from below all along: near, but flat.
     pipe, floor = wall_points(rng, 0.0, 1.0, arc=np.radians(240)), floor_points(rng, -1.0, 2.0)
@@ -82,7 +96,12 @@ def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
 
 def test_that_a_surface_without_points_has_no_extent(rng):
     nothing = np.empty(0)
-    assert find_extent(nothing, nothing, nothing, nothing, 1.0, RADIUS, VOXEL, NOISE) is None
+    assert (
+        find_extent(
+            nothing, nothing, nothing, nothing, (nothing, nothing), 1.0, RADIUS, VOXEL, NOISE
+        )
+        is None
+    )
     assert extent_of(wall_points(rng, 5.0, 6.0)) is None
 
 
