@@ -49,6 +49,23 @@ class History:
         """Go forward again, if something was undone."""
         self._move(self._future, self._past)
 
+    @property
+    def steps(self) -> list[str]:
+        """What was done, the first step first, and what was undone after it."""
+        return [r.text for r in self._past] + [r.text for r in reversed(self._future)]
+
+    @property
+    def n_done(self) -> int:
+        """How many of `steps` are done; the others were undone."""
+        return len(self._past)
+
+    def go_to(self, n_done: int) -> None:
+        """Undo or redo until so many steps are done."""
+        while len(self._past) > max(n_done, 0):
+            self.undo()
+        while len(self._past) < n_done and self._future:
+            self.redo()
+
     def _move(self, source: list[Revision], target: list[Revision]) -> None:
         if not source:
             return

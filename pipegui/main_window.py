@@ -59,6 +59,7 @@ class MainWindow(QMainWindow):
         self.centre = QStackedWidget()
         arrange(self)
         self.menu_actions.list_recent()
+        self.menu_actions.list_history()
         wiring.connect_panels(self)
         wiring.connect_views(self)
         wiring.connect_jobs(self)

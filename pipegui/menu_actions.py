@@ -28,6 +28,7 @@ class MenuActions:
     def __init__(self, window: "MainWindow") -> None:
         self._window = window
         self._recent_menu: QMenu | None = None
+        self._history_menu: QMenu | None = None
         self._search: CommandSearch | None = None
 
     # Opening
@@ -55,6 +56,25 @@ class MenuActions:
             action.setToolTip(str(path))
             action.triggered.connect(lambda _=False, path=path: window.open_files([path]))
         self._recent_menu.setToolTipsVisible(True)
+
+    # History
+
+    def list_history(self) -> None:
+        """Bring the menu of steps up to date: a click goes back or forward to a step."""
+        window, history = self._window, self._window.history
+        if self._history_menu is None:
+            self._history_menu = QMenu("History", window)
+            edit_menu = window.actions_.menus["Edit"]
+            edit_menu.insertMenu(window.actions_["go_up"], self._history_menu)
+            edit_menu.aboutToShow.connect(self.list_history)
+        menu = self._history_menu
+        menu.clear()
+        menu.setEnabled(bool(history.steps))
+        for n_done, text in enumerate(["Start", *history.steps]):
+            action = menu.addAction(text)
+            action.setCheckable(True)
+            action.setChecked(n_done == history.n_done)
+            action.triggered.connect(lambda _=False, n=n_done: history.go_to(n))
 
     # Settings
 

@@ -1,9 +1,11 @@
-"""Command search: from a few typed letters to the action."""
+"""Command search, from a few typed letters to the action; the menu of the steps done."""
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
+from pipegui import commands
 from pipegui.command_search import CommandSearch, match
 from pipegui.main_window import MainWindow
 
@@ -85,3 +87,22 @@ def test_that_nothing_found_is_said(qtbot, search):
     assert names(search) == ["No action is called that"]
     qtbot.keyClick(search.field, Qt.Key.Key_Return)
     assert search.isVisible()
+
+
+def test_that_the_history_menu_goes_back_and_forward_to_any_step(qtbot, detected):
+    detected.do(commands.set_hidden, [1], True)
+    detected.do(commands.set_hidden, [2], True)
+    n_steps = len(detected.history.steps)
+    detected.actions_.menus["Edit"].aboutToShow.emit()
+    menu = next(m for m in detected.findChildren(QMenu) if m.title() == "History")
+    actions = menu.actions()
+    assert [a.text() for a in actions] == ["Start", *detected.history.steps]
+    assert [a.isChecked() for a in actions] == [False] * n_steps + [True]
+    actions[n_steps - 2].trigger()
+    assert detected.document.view.hidden_elements == frozenset()
+    detected.menu_actions.list_history()
+    menu.actions()[-1].trigger()
+    assert detected.document.view.hidden_elements == frozenset({1, 2})
+    detected.menu_actions.list_history()
+    menu.actions()[0].trigger()
+    assert detected.document.scan is None

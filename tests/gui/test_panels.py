@@ -55,6 +55,33 @@ def test_that_the_project_model_keeps_qts_rules_while_scans_come_and_go(qtbot, d
     del tester
 
 
+def shown_names(tree, parent=QModelIndex()):  # noqa: B008
+    """Names of the rows that the filter leaves, depth first."""
+    names = []
+    for row in range(tree.model.rowCount(parent)):
+        if not tree.view.isRowHidden(row, parent):
+            index = tree.model.index(row, NAME, parent)
+            names += [index.data(), *shown_names(tree, index)]
+    return names
+
+
+def test_that_typing_filters_the_tree_and_clearing_shows_all(qtbot, document):
+    tree = show(qtbot, ProjectTree())
+    tree.apply(resolve(document).tree)
+    everything = shown_names(tree)
+    qtbot.keyClicks(tree.filter, "bend")
+    left = shown_names(tree)
+    bends = [name for name in everything if "bend" in name.lower()]
+    assert bends
+    assert set(bends) <= set(left)
+    assert not any(name.startswith("Pipe ") for name in left)
+    # A new state keeps the filter.
+    tree.apply(resolve(commands.open_scan(document, document.scan)).tree)
+    assert not any(name.startswith("Pipe ") for name in shown_names(tree))
+    tree.filter.clear()
+    assert set(everything) <= set(shown_names(tree))
+
+
 def test_that_the_tree_holds_runs_elements_and_deformations(qtbot, document):
     model = ProjectModel()
     model.apply(resolve(document).tree)
