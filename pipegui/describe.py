@@ -209,8 +209,8 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
     for name, point in (("Start", element.axis.start), ("End", element.axis.end)):
         yield _position(name, point + result.origin)
     if element.gaps:
-        gaps = ", ".join(f"{a:.2f} – {b:.2f} m" for a, b in element.gaps)
-        yield Property("Gaps", gaps, hint="Chainages without profiles.")
+        gaps = ", ".join(f"{a:.2f} – {b:.2f} m ({b - a:.2f} m)" for a, b in element.gaps)
+        yield Property("Gaps", gaps, hint="Chainages without profiles, and their lengths.")
 
 
 def _of_deformation(

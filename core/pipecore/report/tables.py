@@ -50,6 +50,8 @@ ELEMENT_COLUMNS = (
     "ovality_sd_pct",
     "straightness_mm",
     "n_deformations",
+    "n_gaps",
+    "gaps_m",
 )
 
 PROFILE_COLUMNS = (
@@ -183,6 +185,8 @@ def _element_row(element: Element, result: Result, place: FileCoordinates) -> li
         _pct(element.ovality_sd),
         _mm(element.straightness),
         str(len(result.deformations_of(element.element_id))),
+        str(len(element.gaps)),
+        cell(sum(end - start for start, end in element.gaps), 4),
     ]
 
 

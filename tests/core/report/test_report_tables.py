@@ -60,6 +60,16 @@ def test_that_the_columns_of_the_contract_are_there_in_order(contract, tmp_path)
     assert not raw.startswith(b"\xef\xbb\xbf")
 
 
+def test_that_gaps_are_counted_and_their_lengths_summed(tmp_path):
+    result = make_result(2000)
+    first, *others = result.elements
+    gappy = replace(first, gaps=((0.2, 0.35), (0.5, 0.6)))
+    result = replace(result, elements=(gappy, *others))
+    rows = rows_of(write_elements_csv, result, tmp_path / "elements.csv")
+    assert [int(row["n_gaps"]) for row in rows[:2]] == [2, len(others[0].gaps)]
+    assert number(rows[0]["gaps_m"]) == pytest.approx(0.25)
+
+
 def test_that_the_elements_table_gives_back_what_was_measured(tmp_path):
     result = make_result(2000)
     rows = rows_of(write_elements_csv, result, tmp_path / "elements.csv")
