@@ -168,7 +168,7 @@ def test_that_dents_in_bends_and_reducers_are_found(rng, form):
     found = [d for d in find(scene.scan(rng)).deformations if d.kind in PATCHES]
     (dent,) = found
     assert dent.kind is DeformationKind.DENT
-    assert dent.depth == pytest.approx(0.012, rel=0.25)
+    assert dent.depth == pytest.approx(0.012, rel=0.3)
     assert abs(dent.chainage - 0.4) < 0.02
 
 
