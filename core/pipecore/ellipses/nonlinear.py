@@ -114,7 +114,7 @@ class FittedEllipse(PlaneEllipse):
 
 @dataclass(frozen=True)
 class NoFit:
-    """Why points carry no ellipse. It is false."""
+    """Why points carry no ellipse or other curve. It is false."""
 
     reason: str
 
