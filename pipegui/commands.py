@@ -12,7 +12,7 @@ import numpy as np
 
 from pipecore.report.summary import by_verdict
 from pipecore.settings import DirectionPreset, Settings
-from pipecore.types import NO_ID, PointCloud, Result
+from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
 from pipegui import selecting
 from pipegui.document import ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
 
@@ -56,7 +56,7 @@ def close_scan(document: Document, index: int) -> Document:
 def activate_scan(document: Document, index: int) -> Document:
     """Look at another scan."""
     document = replace(document, active=index, selection=Selection())
-    view = replace(document.view, hidden_elements=frozenset(), shown_stack=NO_ID)
+    view = replace(document.view, hidden_elements=frozenset(), shown_stack=NO_ID, clip_box=None)
     if document.scan is not None and view.colour_by not in colours_of(document.scan):
         view = replace(view, colour_by=colours_of(document.scan)[0])
     return replace(document, view=view)
@@ -78,7 +78,8 @@ def set_result(document: Document, cloud: PointCloud, result: Result) -> Documen
         return document
     old = document.scans[index].result
     scans = list(document.scans)
-    scans[index] = replace(scans[index], result=result)
+    reviews = selecting.reviews_carried_over(scans[index].reviews, old, result)
+    scans[index] = replace(scans[index], result=result, reviews=reviews)
     selection = document.selection
     if index == document.active:
         selection = selecting.carried_over(selection, old, result)
@@ -91,6 +92,39 @@ def set_result(document: Document, cloud: PointCloud, result: Result) -> Documen
         if colour is ColourBy.PROFILE:
             view = replace(view, colour_by=ColourBy.DEVIATION)
     return replace(document, scans=tuple(scans), selection=selection, view=view)
+
+
+# Reviewing
+
+
+@step("Review")
+def set_review(document: Document, deformation_ids: Iterable[int], state: ReviewState) -> Document:
+    """Accept deformations, reject them, or leave them open again."""
+    return _reviewed(document, {i: {"state": state} for i in deformation_ids})
+
+
+@step("Comment")
+def set_comment(document: Document, deformation_id: int, comment: str) -> Document:
+    """Say something about a deformation."""
+    return _reviewed(document, {deformation_id: {"comment": comment.strip()}})
+
+
+def _reviewed(document: Document, changes: Mapping[int, Mapping[str, Any]]) -> Document:
+    scan = document.scan
+    if scan is None:
+        return document
+    changed = {i: replace(scan.review(i), **change) for i, change in changes.items()}
+    reviews = {i: r for i, r in (dict(scan.reviews) | changed).items() if r != Review()}
+    if reviews == scan.reviews:
+        return document
+    return _with_scan(document, replace(scan, reviews=reviews))
+
+
+def _with_scan(document: Document, scan: Scan) -> Document:
+    """Put a scan in the place of the active one."""
+    scans = list(document.scans)
+    scans[document.active] = scan
+    return replace(document, scans=tuple(scans))
 
 
 def colours_of(scan: Scan) -> tuple[ColourBy, ...]:

@@ -4,11 +4,12 @@ A command takes a `Document` and returns the next one; undo is going back to an
 earlier one. Nothing here knows Qt or VTK.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from pipecore.settings import Settings
-from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result
+from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
 
 
 class ColourBy(StrEnum):
@@ -56,6 +57,14 @@ class Selection:
 
 
 @dataclass(frozen=True)
+class Box:
+    """An upright box in the local coordinates of the active scan, metres."""
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class ViewOptions:
     """How things are shown."""
 
@@ -72,15 +81,23 @@ class ViewOptions:
     plot_stack: int = OWN_STACK
     """The stack that the radius plot shows while no profile is selected."""
     fly: bool = True
+    clip_box: Box | None = None
+    """Only what lies within is shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A cloud with the result of its last detection, if any."""
+    """A cloud with the result of its last detection, if any, and what a person says of it."""
 
     name: str
     cloud: PointCloud
     result: Result | None = None
+    reviews: Mapping[int, Review] = field(default_factory=dict)
+    """By the ids of the deformations; those that nobody has looked at are not in it."""
+
+    def review(self, deformation_id: int) -> Review:
+        """Return what a person said of a deformation, or that it is open."""
+        return self.reviews.get(deformation_id, Review())
 
 
 @dataclass(frozen=True, eq=False)

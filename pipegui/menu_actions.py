@@ -104,11 +104,13 @@ class MenuActions:
         """Ask where to, and write a table: "deformations", "elements" or "profiles"."""
         from pipecore import report  # noqa: PLC0415
 
-        result = self._window.document.result
-        if result is not None:
-            write = getattr(report, f"write_{table}_csv")
-            name = f"{self._stem()} {table}.csv"
-            self._save(f"Export {table}", name, CSV, lambda path: write(path, result))
+        scan = self._window.document.scan
+        if scan is None or scan.result is None:
+            return
+        content = (scan.result, scan.reviews) if table == "deformations" else (scan.result,)
+        write = getattr(report, f"write_{table}_csv")
+        name = f"{self._stem()} {table}.csv"
+        self._save(f"Export {table}", name, CSV, lambda path: write(path, *content))
 
     def export_picture(self) -> None:
         """Ask where to, and save what the 3D view shows."""
@@ -129,10 +131,10 @@ class MenuActions:
         folder = files.ask_report_folder(window, window.stored, f"{self._stem()} report")
         if folder is None:
             return
-        cloud, result = scan.cloud, scan.result
+        cloud, result, reviews = scan.cloud, scan.result, scan.reviews
 
         def write(progress: Progress) -> None:
-            report.write_report(folder, cloud, result, progress=progress)
+            report.write_report(folder, cloud, result, reviews=reviews, progress=progress)
 
         window.jobs.write(folder, write)
 

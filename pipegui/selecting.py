@@ -3,11 +3,13 @@
 Qt-free. A selection always carries what contains it, so nobody has to look it up.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from pipecore.geometry import Array
 from pipecore.report.summary import by_verdict
-from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, Result
+from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, Result, Review
 from pipegui.document import ProfileKey, Selection
 
 
@@ -88,6 +90,22 @@ def carried_over(selection: Selection, old: Result | None, new: Result | None) -
             chainage, _, _ = twin.axis.pipe_coordinates(rows.centre[row][:1])
             profile = nearest_profile(new, twin.element_id, float(chainage[0]))
             kept = Selection(kept.run_id, kept.element_id, kept.deformation_id, profile)
+    return kept
+
+
+def reviews_carried_over(
+    reviews: Mapping[int, Review], old: Result | None, new: Result
+) -> Mapping[int, Review]:
+    """Return what was said of deformations for those that are found again."""
+    if old is None or old is new:
+        return reviews
+    kept = {}
+    for deformation_id, review in sorted(reviews.items()):
+        deformation = old.deformation(deformation_id)
+        twin = _same_element(old.element(deformation.element_id), new)
+        same = _same_deformation(deformation, twin, new) if twin is not None else None
+        if same is not None:
+            kept.setdefault(same.deformation_id, review)
     return kept
 
 

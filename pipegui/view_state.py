@@ -6,6 +6,7 @@ compared by identity, so cuts out of a result are made once and kept.
 Nothing here knows Qt or VTK.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any
@@ -23,6 +24,7 @@ from pipecore.types import (
     PointCloud,
     Profiles,
     Result,
+    Review,
     Stack,
 )
 from pipegui import cuts, selecting
@@ -193,6 +195,8 @@ class TableState:
 
     result: Result | None = None
     selected: int = NO_ID
+    reviews: Mapping[int, Review] = field(default_factory=dict)
+    """By the ids of the deformations; those that are open without a word are not in it."""
 
 
 @dataclass(frozen=True)
@@ -260,7 +264,7 @@ def resolve(document: Document) -> ViewState:
             view.shown_stack,
         ),
         settings=document.settings,
-        table=TableState(result, selection.deformation_id),
+        table=TableState(result, selection.deformation_id, scan.reviews if scan else {}),
         properties=PropertiesState(scan, selection, profile),
         **_element_states(scan, selection, view, shown),
     )

@@ -5,10 +5,12 @@ is in *local* coordinates: world coordinates less the cloud's `origin`. Quantiti
 that the scan cannot carry are nan, never a guess.
 """
 
+from bisect import bisect_left
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -349,6 +351,22 @@ class Deformation:
     significance: float = np.nan
 
 
+class ReviewState(StrEnum):
+    """What a person decided about a deformation; the values are those of the report."""
+
+    OPEN = "open"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Review:
+    """A person's word on a deformation, beside the rule's verdict."""
+
+    state: ReviewState = ReviewState.OPEN
+    comment: str = ""
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """What a detection found, with the settings that made it.
@@ -365,10 +383,11 @@ class Result:
     stacks : tuple of Stack
         In the order of their ids.
     elements : tuple of Element
-        In the order of their ids.
+        In the order of their ids, 1, 2, … as detected. What is deleted afterwards leaves
+        a gap, so that the others keep their ids.
     profiles : Profiles
     deformations : tuple of Deformation
-        In the order of their ids.
+        In the order of their ids, as for elements.
     segment_id, element_id : ndarray of int32, shape (n,)
         `NO_ID` for points of none.
     deviation : ndarray of float32, shape (n,)
@@ -392,13 +411,24 @@ class Result:
     seconds: dict[str, float]
 
     def element(self, element_id: int) -> Element:
-        """Return the element with this id."""
-        return self.elements[element_id - 1]
+        """Return the element with this id; `KeyError` if there is none."""
+        return _with_id(self.elements, "element_id", element_id)
 
     def deformation(self, deformation_id: int) -> Deformation:
-        """Return the deformation with this id."""
-        return self.deformations[deformation_id - 1]
+        """Return the deformation with this id; `KeyError` if there is none."""
+        return _with_id(self.deformations, "deformation_id", deformation_id)
 
     def deformations_of(self, element_id: int) -> tuple[Deformation, ...]:
         """Return the deformations of one element."""
         return tuple(d for d in self.deformations if d.element_id == element_id)
+
+
+Numbered = TypeVar("Numbered", Element, Deformation)
+
+
+def _with_id(items: tuple[Numbered, ...], name: str, wanted: int) -> Numbered:
+    """Find an item by its id among items in the order of their ids."""
+    place = bisect_left(items, wanted, key=attrgetter(name))
+    if place == len(items) or getattr(items[place], name) != wanted:
+        raise KeyError(f"there is no {name} {wanted}")
+    return items[place]

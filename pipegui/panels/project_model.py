@@ -73,7 +73,7 @@ class ProjectModel(QAbstractItemModel):
     def apply(self, state: TreeState) -> bool:
         """Show a state; returns whether the nodes were made anew."""
         before, self._state = self._state, state
-        if state.scans != before.scans:
+        if _shown_of(state.scans) != _shown_of(before.scans):
             self.beginResetModel()
             self._nodes = []
             self._root = self._add(_Node(NodeKind.ROOT, None))
@@ -285,3 +285,8 @@ class ProjectModel(QAbstractItemModel):
         kinds = (NodeKind.DEFORMATIONS, NodeKind.DEFORMATION)
         nodes = [node for node in self._nodes if node.kind in kinds]
         return [self.createIndex(node.row, NAME, node.number) for node in nodes]
+
+
+def _shown_of(scans: tuple[Scan, ...]) -> list[tuple[Any, ...]]:
+    """What of the scans has nodes; reviews, for one, have not."""
+    return [(scan.name, scan.cloud, scan.result) for scan in scans]

@@ -8,9 +8,9 @@ import pytest
 from pipecore.errors import SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.settings import Settings
-from pipecore.types import DeformationKind, Verdict
+from pipecore.types import DeformationKind, Review, ReviewState, Verdict
 from pipegui import commands, selecting
-from pipegui.document import ColourBy, Document, ProfileKey, Scan, Selection
+from pipegui.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
 from pipegui.history import History
 from tests.factories import make_scan
 
@@ -223,3 +223,40 @@ def test_that_every_kind_of_deformation_keeps_its_element_selected():
         document = commands.select_deformation(DETECTED, deformation.deformation_id)
         assert document.selection.element_id == deformation.element_id
     assert {d.kind for d in RESULT.deformations} >= {DeformationKind.DENT, DeformationKind.BULGE}
+
+
+def test_that_reviews_are_steps_of_the_history_and_leave_the_result_alone():
+    history = History(DETECTED)
+    history.do(commands.set_review, [1, 3], ReviewState.ACCEPTED)
+    history.do(commands.set_comment, 3, "  seen on site ")
+    scan = history.document.scan
+    assert scan.reviews == {
+        1: Review(ReviewState.ACCEPTED),
+        3: Review(ReviewState.ACCEPTED, "seen on site"),
+    }
+    assert scan.result is RESULT
+    assert history.steps == ["Review", "Comment"]
+    history.undo()
+    history.undo()
+    assert history.document.scan.reviews == {}
+
+
+def test_that_a_review_that_changes_nothing_is_no_step():
+    history = History(DETECTED)
+    history.do(commands.set_review, [2], ReviewState.OPEN)
+    assert history.steps == []
+
+
+def test_that_reviews_follow_their_deformations_through_another_detection():
+    document = commands.set_review(DETECTED, [1, 3], ReviewState.REJECTED)
+    fewer = shuffled_result()
+    gone = [d for d in fewer.deformations if d.deformation_id != 3]
+    renumbered = tuple(replace(d, deformation_id=i) for i, d in enumerate(reversed(gone), start=1))
+    again = commands.set_result(document, CLOUD, replace(fewer, deformations=renumbered))
+    assert again.scan.reviews == {3: Review(ReviewState.REJECTED)}
+    assert again.result.deformation(3).peak == pytest.approx(RESULT.deformation(1).peak)
+
+
+def test_that_another_scan_is_not_clipped_by_the_box_of_the_first():
+    document = commands.set_view(DETECTED, clip_box=Box((0, 0, 0), (1, 1, 1)))
+    assert commands.open_scan(document, Scan("b", CLOUD)).view.clip_box is None

@@ -7,17 +7,19 @@ Importing this package imports neither the plot library nor the LAZ writer.
 """
 
 import os
+from collections.abc import Mapping
 
 from pipecore.io import write_directory, write_file, write_laz
 from pipecore.progress import NoProgress, Progress
 from pipecore.report.result_json import result_to_dict, write_result_json
 from pipecore.report.summary import by_verdict, summarise
 from pipecore.report.tables import (
+    NOT_REVIEWED,
     write_deformations_csv,
     write_elements_csv,
     write_profiles_csv,
 )
-from pipecore.types import PointCloud, Result
+from pipecore.types import PointCloud, Result, Review
 
 __all__ = [
     "by_verdict",
@@ -37,6 +39,7 @@ def write_report(
     cloud: PointCloud,
     result: Result,
     *,
+    reviews: Mapping[int, Review] = NOT_REVIEWED,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> None:
@@ -52,6 +55,8 @@ def write_report(
     cloud : PointCloud
         The cloud that `result` was detected in.
     result : Result
+    reviews : mapping of int to Review
+        What a person said of the deformations, by their ids.
     overwrite : bool
         Whether the folder may already hold files; those of a former report are replaced.
     progress : Progress, optional
@@ -70,7 +75,7 @@ def write_report(
     with write_directory(directory, overwrite=overwrite) as folder:
         (folder / "settings.toml").write_text(result.settings.to_toml(), encoding="utf-8")
         write_elements_csv(folder / "elements.csv", result)
-        write_deformations_csv(folder / "deformations.csv", result)
+        write_deformations_csv(folder / "deformations.csv", result, reviews)
         write_profiles_csv(folder / "profiles.csv", result, progress)
         write_result_json(folder / "result.json", result, progress)
         write_html(folder / "report.html", cloud, result, progress)

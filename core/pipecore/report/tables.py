@@ -7,8 +7,9 @@ Columns may be added; these keep name and meaning.
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.report.format import cell, format_clock, text_cell
 from pipecore.report.world import FileCoordinates
 from pipecore.rules import outside_diameter
-from pipecore.types import Array, Deformation, Element, ElementKind, Profiles, Result
+from pipecore.types import Array, Deformation, Element, ElementKind, Profiles, Result, Review
 
 ELEMENT_COLUMNS = (
     "element_id",
@@ -99,9 +100,12 @@ DEFORMATION_COLUMNS = (
     "n_points",
     "rule",
     "verdict",
+    "review",
+    "comment",
 )
 
 ROWS_AT_A_TIME = 5_000
+NOT_REVIEWED: Mapping[int, Review] = MappingProxyType({})
 
 
 def write_elements_csv(path: str | os.PathLike[str], result: Result) -> None:
@@ -123,10 +127,19 @@ def write_profiles_csv(
     _write(path, PROFILE_COLUMNS, _profile_rows(result, progress or NoProgress()))
 
 
-def write_deformations_csv(path: str | os.PathLike[str], result: Result) -> None:
-    """Write the table of deformations; errors as for `write_elements_csv`."""
+def write_deformations_csv(
+    path: str | os.PathLike[str], result: Result, reviews: Mapping[int, Review] = NOT_REVIEWED
+) -> None:
+    """Write the table of deformations with what a person said of them, by their ids.
+
+    Errors as for `write_elements_csv`.
+    """
     place = FileCoordinates.of(result)
-    rows = (_deformation_row(d, result.element(d.element_id), place) for d in result.deformations)
+    rows = (
+        _deformation_row(d, result.element(d.element_id), place)
+        + _review_cells(reviews.get(d.deformation_id, Review()))
+        for d in result.deformations
+    )
     _write(path, DEFORMATION_COLUMNS, rows)
 
 
@@ -213,6 +226,10 @@ def _deformation_row(
         text_cell(deformation.rule),
         deformation.verdict,
     ]
+
+
+def _review_cells(review: Review) -> list[str]:
+    return [review.state, text_cell(" ".join(review.comment.split()))]
 
 
 def _profile_rows(result: Result, progress: Progress) -> Iterator[tuple[str, ...]]:

@@ -8,7 +8,7 @@ import pytest
 from pipecore.errors import WriteError
 from pipecore.report import write_deformations_csv, write_elements_csv, write_profiles_csv
 from pipecore.settings import Settings
-from pipecore.types import Deformation, Element, NominalSize, Profiles
+from pipecore.types import Deformation, Element, NominalSize, Profiles, Review, ReviewState
 from tests.factories import make_result
 
 ELEMENT_CONTRACT = (
@@ -182,3 +182,25 @@ def test_that_an_empty_result_gives_tables_with_a_header_alone(tmp_path):
 def test_that_a_table_that_cannot_be_written_says_where(tmp_path):
     with pytest.raises(WriteError, match="gone"):
         write_elements_csv(tmp_path / "gone" / "elements.csv", make_result(2000))
+
+
+def test_that_reviews_stand_beside_the_verdicts(tmp_path):
+    path = tmp_path / "deformations.csv"
+    reviews = {3: Review(ReviewState.REJECTED, "=1+1\nsee photo, 12"), 1: Review(comment="?")}
+    write_deformations_csv(path, make_result(2000), reviews)
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = {int(row["deformation_id"]): row for row in csv.DictReader(file)}
+    assert [rows[i]["review"] for i in (1, 2, 3, 4)] == ["open", "open", "rejected", "open"]
+    assert rows[1]["comment"] == "?"
+    assert rows[2]["comment"] == ""
+    assert rows[3]["comment"] == "'=1+1 see photo, 12"
+
+
+def test_that_items_keep_their_ids_when_others_are_gone():
+    result = make_result(2000)
+    fewer = replace(result, elements=(result.elements[0], *result.elements[3:]))
+    assert fewer.element(4) is result.elements[3]
+    with pytest.raises(KeyError):
+        fewer.element(2)
+    with pytest.raises(KeyError):
+        result.element(0)
