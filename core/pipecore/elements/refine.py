@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.elements.bands import is_off_bands
 from pipecore.elements.extent import (
     MAX_SECTORS,
     Extent,
@@ -32,6 +33,8 @@ Flags = NDArray[np.bool_]
 
 RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
 """A point belongs to a surface only if its normal is this close to the surface's."""
+CLEAR_COS = float(np.cos(np.deg2rad(15.0)))
+"""Beside bands the normals of the pipe's own points are this close to the surface's."""
 MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 4_000
 """Larger elements are fitted to an even sample of this many points; fewer in early rounds."""
 INSIDE = 0.1
@@ -140,6 +143,8 @@ def refine_piece(
         core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
         chosen = near.own[core if core.sum() > 30 else within]
         fit = _fit_to(model, chosen, nearby, 3.0 * sigma, is_final)
+        if is_final and fit is not None and isinstance(fit.model, LineSurface):
+            fit = _fit_off_bands(fit, chosen, nearby, spacing)
         if fit is None:
             return None
         misfit = section_misfit(clock[within], near.residual[within], extent.arc)
@@ -251,6 +256,23 @@ def _fit_to(
     if fit is None or abs(fit.model.radius - model.radius) > MAX_RADIUS_CHANGE * model.radius:
         return None
     return fit
+
+
+def _fit_off_bands(
+    fit: SurfaceFit[LineSurface], thinned: Indices, nearby: NearbyPoints, spacing: float
+) -> SurfaceFit[Any] | None:
+    """The fit, once more without the bands around the pipe where there are some."""
+    model = fit.model
+    xyz = nearby.surface.xyz[thinned]
+    chainage = (xyz - model.middle) @ model.direction
+    residual, _, outward = model.residuals(xyz)
+    is_own = is_off_bands(chainage, residual, spacing, model.radius)
+    if is_own is None:
+        return fit
+    # Where a band or a rib meets the pipe, the normals turn away before the points do.
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
+    is_own &= cosine > CLEAR_COS
+    return _fit_to(model, thinned[is_own], nearby, 3.0 * fit.sigma, True)
 
 
 def _refine_sphere(
