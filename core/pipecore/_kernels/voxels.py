@@ -1,6 +1,7 @@
 """Means of the points in each cube of a grid, and look-up of the cubes' neighbours.
 
-Sums are kept in whole micrometres, so that they do not depend on the points' order.
+Cubes begin at whole multiples of their edge from the local zero, and sums are kept in
+whole micrometres, so that a part of the cloud is thinned as the whole is, in any order.
 """
 
 import math
@@ -13,12 +14,12 @@ EMPTY = np.int64(-1)
 
 
 @njit(cache=True, nogil=True)
-def voxel_keys(xyz, low, edge, n_y, n_z, keys):
-    """Write the number of the cube that each point lies in."""
+def voxel_keys(xyz, first, edge, n_y, n_z, keys):
+    """Write the number of the cube that each point lies in, counted from cube `first`."""
     for i in range(xyz.shape[0]):
-        ix = np.int64(math.floor((xyz[i, 0] - low[0]) / edge))
-        iy = np.int64(math.floor((xyz[i, 1] - low[1]) / edge))
-        iz = np.int64(math.floor((xyz[i, 2] - low[2]) / edge))
+        ix = np.int64(math.floor(xyz[i, 0] / edge)) - first[0]
+        iy = np.int64(math.floor(xyz[i, 1] / edge)) - first[1]
+        iz = np.int64(math.floor(xyz[i, 2] / edge)) - first[2]
         keys[i] = (ix * n_y + iy) * n_z + iz
 
 
@@ -48,12 +49,12 @@ def number_voxels(keys, table_keys, table_ids, ids, first_id):
 
 
 @njit(cache=True, nogil=True)
-def sum_voxels(xyz, ids, low, sums, counts):
+def sum_voxels(xyz, ids, sums, counts):
     """Add up the points of each voxel, in whole micrometres."""
     for i in range(xyz.shape[0]):
         k = ids[i]
         for j in range(3):
-            sums[k, j] += np.int64(round((xyz[i, j] - low[j]) * 1e6))
+            sums[k, j] += np.int64(round(xyz[i, j] * 1e6))
         counts[k] += 1
 
 

@@ -199,6 +199,14 @@ def line_rss(points: Array, starts: NDArray[np.int64]) -> Array:
     return np.asarray(0.5 * (xx + yy) - np.hypot(0.5 * (xx - yy), xy))
 
 
+def _combined(components: Array, vectors: Array) -> Array:
+    """Sums of vectors by rows of components.
+
+    Not by BLAS, whose rounding depends on how many rows there are.
+    """
+    return np.asarray(sum(c[:, None] * v for c, v in zip(components.T, vectors, strict=False)))
+
+
 def _to_space(
     curves: Curves,
     kept: NDArray[np.intp],
@@ -209,8 +217,8 @@ def _to_space(
     aic_ellipse: Array,
 ) -> Ellipses:
     frame = curves.frame
-    centre = fits[:, :2] @ frame[:2] + curves.mid_plane(kept)[:, None] * frame[2]
-    axis = fits[:, 2:5] @ frame
+    centre = _combined(fits[:, :2], frame) + curves.mid_plane(kept)[:, None] * frame[2]
+    axis = _combined(fits[:, 2:5], frame)
     radius, arc, n_points = fits[:, 5], fits[:, 7], fits[:, 8].astype(np.int32)
     # The major axis of the constrained ellipse runs along the axis's tilt.
     angle = np.where(is_free, free.angle, np.arctan2(fits[:, 3], fits[:, 2]))
@@ -223,7 +231,7 @@ def _to_space(
         axis=axis,
         radius=radius,
         radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),
-        meeting_point=fits[:, 12:15] @ frame + curves.mid_plane(kept)[:, None] * frame[2],
+        meeting_point=_combined(fits[:, 12:15], frame) + curves.mid_plane(kept)[:, None] * frame[2],
         meeting_distance=fits[:, 15],
         arc=arc,
         n_points=n_points,

@@ -132,7 +132,9 @@ def segment_profiles(
     tolerance = surface.tolerance
 
     # Sort by profile and by cell within it, row by row, with empty margins between.
-    cell_uv = np.floor((uv - uv.min(axis=0)) / gap).astype(np.int64)
+    # Cells count from the local zero: a part of the cloud is sorted as the whole is.
+    cell_uv = np.floor(uv / gap).astype(np.int64)
+    cell_uv -= cell_uv.min(axis=0)
     n_u, n_v = cell_uv.max(axis=0) + 12
     keys = ((profile - profile.min()) * n_u + cell_uv[:, 0]) * n_v + cell_uv[:, 1]
     order = np.argsort(keys, kind="stable")

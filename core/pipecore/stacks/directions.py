@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
-from pipecore.progress import Progress
+from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
 from pipecore.surface.grid import CellGrid
 
@@ -31,20 +31,42 @@ def local_axes(surface: Surface, progress: Progress) -> Array:
     usable = np.flatnonzero(~np.isnan(surface.normals[:, 0]))
     if len(usable) == 0:
         return np.empty((0, 3))
-    radius = REACH * surface.voxel
-    xyz, normals = surface.xyz[usable], surface.normals[usable]
-    grid = CellGrid.build(xyz, radius)
-    xyz, normals = xyz[grid.order], normals[grid.order]
-    sample = np.unique(np.linspace(0, len(xyz) - 1, N_SAMPLES).astype(np.intp))
+    sample = usable[sample_positions(len(usable))]
+    return axes_at(surface.xyz, surface.normals, sample, surface.voxel, progress)
+
+
+def sample_positions(n_usable: int) -> NDArray[np.intp]:
+    """Which of the points with a normal are looked at, by their order: evenly spread ones."""
+    return np.unique(np.linspace(0, n_usable - 1, N_SAMPLES).astype(np.intp))
+
+
+def axes_at(
+    points: Array,
+    normals: Array,
+    sample: NDArray[np.intp],
+    voxel: float,
+    progress: Progress = NoProgress(),
+) -> Array:
+    """Directions of the local axis at those of the sampled points that lie on curved places.
+
+    What is further than `REACH` voxels from all sampled points does not change the result.
+    """
+    radius = REACH * voxel
+    grid = CellGrid.build(points, radius)
+    xyz, normals = points[grid.order], normals[grid.order]
+    place = np.empty(len(points), np.intp)
+    place[grid.order] = np.arange(len(points))
+    place = place[sample]
     axes, spreads = np.empty((len(sample), 3)), np.empty((len(sample), 3))
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_local_axes(
-            xyz, normals, *grid.lookup, radius, sample, start, stop, axes, spreads
+            xyz, normals, *grid.lookup, radius, place, start, stop, axes, spreads
         )
 
     for_chunks(work, len(sample), 2_000, "directions", progress)
-    is_curved = (spreads[:, 1] > CURVED) & (spreads[:, 0] < 0.25 * spreads[:, 1])
+    with np.errstate(invalid="ignore"):
+        is_curved = (spreads[:, 1] > CURVED) & (spreads[:, 0] < 0.25 * spreads[:, 1])
     return axes[is_curved]
 
 

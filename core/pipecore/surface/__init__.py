@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
-from pipecore.progress import Progress
+from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import CellGrid
 from pipecore.surface.thinning import ThinnedCloud, median_spacing, thin
@@ -17,13 +17,18 @@ __all__ = [
     "Surface",
     "ThinnedCloud",
     "estimate_normals",
+    "fit_planes",
     "median_spacing",
     "sample_surface",
     "thin",
 ]
 
 NEIGHBOURHOOD = 2.8
-"""Radius of the neighbourhood of a normal, in voxels."""
+"""Radius of the neighbourhood of a normal, in voxels …"""
+WIDEST_NEIGHBOURHOOD = 4 * NEIGHBOURHOOD
+"""… and where there are few points."""
+NOISE_QUANTILE = 0.25
+"""Of the distances from the planes: edges and corners do not count as noise."""
 
 MIN_NEIGHBOURS = 7
 
@@ -59,12 +64,25 @@ class Surface:
         return max(0.25 * self.voxel, 3.0 * self.noise, 0.002)
 
 
-def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
-    """Fit a plane to the neighbourhood of every thinned point."""
-    n = len(thinned.xyz)
-    radius = NEIGHBOURHOOD * thinned.voxel
-    grid = CellGrid.build(thinned.xyz, radius)
-    xyz = thinned.xyz[grid.order]
+def fit_planes(
+    points: NDArray[np.float64], voxel: float, progress: Progress = NoProgress()
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Fit a plane to the neighbourhood of every thinned point.
+
+    The neighbourhood reaches at most `WIDEST_NEIGHBOURHOOD` voxels; what lies beyond does
+    not change a bit of the result.
+
+    Returns
+    -------
+    normals : ndarray, shape (m, 3)
+    residuals, spacing : ndarray, shape (m,)
+        Root mean square distance of the neighbours from the plane, and the distance between
+        them, metres; nan where there are too few.
+    """
+    n = len(points)
+    radius = NEIGHBOURHOOD * voxel
+    grid = CellGrid.build(points, radius)
+    xyz = points[grid.order]
     normals, residuals, spacing = np.empty((n, 3)), np.empty(n), np.empty(n)
 
     def work(start: int, stop: int) -> None:
@@ -73,10 +91,17 @@ def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
         )
 
     for_chunks(work, n, 50_000, "normals", progress)
-    noise = float(np.nanquantile(residuals, 0.25)) if np.isfinite(residuals).any() else np.nan
     back = np.empty(n, np.intp)
     back[grid.order] = np.arange(n)
-    return Surface(thinned.xyz, normals[back], spacing[back], thinned.parent, thinned.voxel, noise)
+    return normals[back], residuals[back], spacing[back]
+
+
+def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
+    """Give thinned points the normals, spacing and noise of their neighbourhoods."""
+    normals, residuals, spacing = fit_planes(thinned.xyz, thinned.voxel, progress)
+    known = np.isfinite(residuals).any()
+    noise = float(np.nanquantile(residuals, NOISE_QUANTILE)) if known else np.nan
+    return Surface(thinned.xyz, normals, spacing, thinned.parent, thinned.voxel, noise)
 
 
 def sample_surface(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> Surface:

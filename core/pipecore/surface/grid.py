@@ -11,24 +11,34 @@ from pipecore.errors import PipecoreError
 Array = NDArray[np.float64]
 
 
+def cells_of(values: NDArray[np.floating], edge: float) -> Array:
+    """Whole number of the cell of each coordinate: cells begin at multiples of `edge`.
+
+    They do not depend on what else is in the cloud, so that a part of it is divided as the
+    whole is.
+    """
+    return np.floor(values.astype(np.float64) / edge)
+
+
 def cell_numbers(
     xyz: NDArray[np.floating], edge: float
-) -> tuple[NDArray[np.int64], Array, int, int]:
-    """Number of each point's cell, the grid's lower corner, and its cells along y and z.
+) -> tuple[NDArray[np.int64], NDArray[np.int64], int, int]:
+    """Number of each point's cell, the grid's first cell, and its cells along y and z.
 
     A margin of four cells around the points keeps the numbers of neighbouring cells distinct.
     """
-    low = xyz.min(axis=0).astype(np.float64) - 4 * edge
-    extent = np.floor((xyz.max(axis=0) - low) / edge) + 5
-    if np.prod(extent) > 2.0**62:
+    lowest = cells_of(xyz.min(axis=0), edge) - 4
+    extent = cells_of(xyz.max(axis=0), edge) - lowest + 5
+    if max(np.prod(extent), np.abs(lowest).max()) > 2.0**62:
         raise PipecoreError(
             f"The points span {extent.max() * edge:.3g} m, too far for cells of "
             f"{edge * 1e3:.3g} mm; crop the cloud or thin it more."
         )
     keys = np.empty(len(xyz), np.int64)
+    first = lowest.astype(np.int64)
     n_y, n_z = int(extent[1]), int(extent[2])
-    voxels.voxel_keys(xyz, low, edge, n_y, n_z, keys)
-    return keys, low, n_y, n_z
+    voxels.voxel_keys(xyz, first, edge, n_y, n_z, keys)
+    return keys, first, n_y, n_z
 
 
 def empty_table(n_keys: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipecore._kernels import voxels
-from pipecore.progress import Progress, in_chunks
+from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import cell_numbers, empty_table
 from pipecore.types import PointCloud
@@ -66,9 +66,18 @@ def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> T
     automatic. The result does not depend on the order of the points.
     """
     progress.update("thinning", 0.0)
-    xyz = cloud.xyz
-    edge = settings.voxel_mm / 1e3 or max(median_spacing(xyz), SMALLEST_VOXEL)
-    keys, low, _, _ = cell_numbers(xyz, edge)
+    edge = settings.voxel_mm / 1e3 or max(median_spacing(cloud.xyz), SMALLEST_VOXEL)
+    return average_voxels(cloud.xyz, edge, progress)
+
+
+def average_voxels(
+    xyz: NDArray[np.floating], edge: float, progress: Progress = NoProgress()
+) -> ThinnedCloud:
+    """Average points (n, 3) in voxels of `edge` metres.
+
+    All points of some voxels give the same means as they do among those of other voxels.
+    """
+    keys, _, _, _ = cell_numbers(xyz, edge)
     parent = np.empty(len(xyz), np.int32)
     table_keys, table_ids = empty_table(len(xyz))
     n_voxels = 0
@@ -83,5 +92,5 @@ def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> T
     rank[np.argsort(key_of_voxel)] = np.arange(n_voxels, dtype=np.int32)
     parent = rank[parent]
     sums, counts = np.zeros((n_voxels, 3), np.int64), np.zeros(n_voxels, np.int64)
-    voxels.sum_voxels(xyz, parent, low, sums, counts)
-    return ThinnedCloud(low + sums / (1e6 * counts[:, None]), parent, edge)
+    voxels.sum_voxels(xyz, parent, sums, counts)
+    return ThinnedCloud(sums / (1e6 * counts[:, None]), parent, edge)

@@ -56,8 +56,8 @@ def test_that_far_coordinates_cost_no_more_than_a_micrometre(rng):
     shift = np.array([320.0, -640.0, 64.0])
     near = thin(PointCloud(np.zeros(3), xyz), ThinningSettings(10.0), NoProgress())
     far = thin(PointCloud(np.zeros(3), xyz + shift), ThinningSettings(10.0), NoProgress())
-    # Cubes count from the lowest point, so that the same points share one, but for those
-    # that rounding takes across a side.
+    # Cubes count from the local zero and the shift is whole cubes, so that the same points
+    # share one, but for those that rounding takes across a side.
     off, _ = cKDTree(near.xyz).query(far.xyz - shift)
     assert np.mean(off < 3e-6) > 0.95
 
