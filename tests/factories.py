@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.deformation import relate_deformations
 from pipecore.geometry import ArcAxis, Array, LineAxis, surface_points
 from pipecore.settings import Settings
 from pipecore.types import (
@@ -30,6 +31,7 @@ from pipecore.types import (
 
 ORIGIN = np.array([432_100.0, 6_201_870.0, 110.0])
 NOISE = 0.002
+PATCHES = (DeformationKind.DENT, DeformationKind.BULGE)
 PROFILE_WIDTH = 0.02
 NAN3 = np.full(3, np.nan)
 
@@ -105,6 +107,9 @@ class _Piece:
             ovality_sd=0.002 if carries_ovality else np.nan,
             straightness=0.0008 if self.kind is ElementKind.CYLINDER else np.nan,
             nominal=self.nominal,
+            not_measurable={}
+            if carries_ovality or self.kind is ElementKind.FLANGE
+            else {"ovality": f"{np.rad2deg(self.arc):.0f}° of arc seen, 200° are needed"},
         )
 
 
@@ -208,6 +213,7 @@ def _deformations(pieces: list[_Piece]) -> tuple[Deformation, ...]:
         ovality: float = np.nan,
     ) -> Deformation:
         clock = np.deg2rad(clock_deg)
+        width = np.deg2rad(width_deg) * pieces[element_id - 1].radius
         return Deformation(
             deformation_id=number,
             element_id=element_id,
@@ -220,12 +226,20 @@ def _deformations(pieces: list[_Piece]) -> tuple[Deformation, ...]:
             depth=depth,
             depth_sd=depth_sd,
             length=length,
-            width=np.deg2rad(width_deg) * pieces[element_id - 1].radius,
+            width=width,
             ovality=ovality,
             n_points=400 + 37 * number,
             rule="asme-6pct",
             verdict=verdict,
             significance=depth / depth_sd,
+            area=np.pi / 4 * length * width if kind in PATCHES else np.nan,
+            # Under a bell of height one over a disc of area one lies 1/2 - 2/π².
+            volume=(0.5 - 2 / np.pi**2) * np.pi / 4 * length * width * depth
+            if kind in PATCHES
+            else np.nan,
+            not_measurable={"strain": "the wall thickness is not set"}
+            if kind is DeformationKind.DENT
+            else {},
         )
 
     return (
@@ -435,7 +449,7 @@ def make_scan(n_points: int = 20_000, seed: int = 1) -> tuple[PointCloud, Result
         stacks=stacks,
         elements=tuple(elements),
         profiles=Profiles.concatenate(tables),
-        deformations=deformations,
+        deformations=relate_deformations(deformations, elements),
         segment_id=element_id.copy(),
         element_id=element_id,
         deviation=np.concatenate(deviations)[order],

@@ -1,11 +1,12 @@
 """Measuring elements at full resolution: their deviations, deformations and normal stacks."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.deformation import find_deformations
+from pipecore.deformation import curvature_variations, find_deformations
 from pipecore.elements import BuiltElements, NearbyPoints
 from pipecore.elements.sections import cut_normal_stack
 from pipecore.progress import Progress
@@ -71,14 +72,20 @@ def measure_elements(
         deviation[own[closer]] = finding.deviation[finding.belongs][closer]
         spacing = nearby.usual_spacing(thinned)
         section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
-        share = (i + 0.5) / len(built.elements)
+        check = partial(progress.update, "deformations", (i + 0.5) / len(built.elements))
         rows = cut_normal_stack(
             element,
             xyz[finding.belongs],
             section_width,
             spacing,
             fit,
-            lambda share=share: progress.update("deformations", share),  # type: ignore[misc]
+            check,
+        )
+        rows = replace(
+            rows,
+            curvature_variation=curvature_variations(
+                element, xyz[finding.belongs], rows, section_width, check
+            ),
         )
         elements.append(
             replace(
@@ -89,6 +96,7 @@ def measure_elements(
                 ovality=finding.ovality,
                 ovality_sd=finding.ovality_sd,
                 straightness=finding.straightness,
+                not_measurable=finding.not_measurable,
             )
         )
         profiles.append(rows)

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from pipecore.axes import join_centres
+from pipecore.deformation import relate_deformations
 from pipecore.elements import NearbyPoints, build_elements, find_pieces
 from pipecore.elements.sections import tabulate_ellipses
 from pipecore.ellipses import Ellipses, fit_ellipses
@@ -138,12 +139,11 @@ def _nothing_found(cloud: PointCloud, settings: Settings) -> Result:
 def judge_deformations(
     deformations: tuple[Deformation, ...], elements: tuple[Element, ...], rule: Rule
 ) -> tuple[Deformation, ...]:
-    """Number the deformations and give each the verdict of a rule."""
+    """Number the deformations, relate them to their surroundings, judge them by a rule."""
+    numbered = [replace(d, deformation_id=i) for i, d in enumerate(deformations, start=1)]
     return tuple(
-        replace(
-            d, deformation_id=i, rule=rule.name, verdict=judge(d, elements[d.element_id - 1], rule)
-        )
-        for i, d in enumerate(deformations, start=1)
+        replace(d, rule=rule.name, verdict=judge(d, elements[d.element_id - 1], rule))
+        for d in relate_deformations(numbered, elements)
     )
 
 

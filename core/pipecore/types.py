@@ -6,6 +6,7 @@ that the scan cannot carry are nan, never a guess.
 """
 
 from bisect import bisect_left
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from operator import attrgetter
@@ -141,6 +142,9 @@ class Element:
         The catalogue size within tolerance, if any.
     gaps : tuple of (float, float)
         Chainage ranges without profiles (paper, figure 11).
+    not_measurable : mapping of str to str
+        Why what is nan could not be measured, by the name of the field; what does not
+        apply to the kind is not in it.
     """
 
     element_id: int
@@ -160,6 +164,7 @@ class Element:
     straightness: float = np.nan
     nominal: NominalSize | None = None
     gaps: tuple[tuple[float, float], ...] = ()
+    not_measurable: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -224,6 +229,9 @@ class Profiles:
     rms : ndarray, shape (m,)
     aic_line, aic_ellipse : ndarray, shape (m,)
         Equation 4 of the paper for either model.
+    curvature_variation : ndarray, shape (m,)
+        Of the smooth curve fitted to the profile (paper, figures 14 and 15): 0 where it is
+        round; see `SectionCurve.curvature_variation`. nan where none was fitted.
     """
 
     element_id: NDArray[np.int32]
@@ -246,6 +254,13 @@ class Profiles:
     rms: Array
     aic_line: Array
     aic_ellipse: Array
+    curvature_variation: Array = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        """Leave nan where no curves were fitted."""
+        if len(self.curvature_variation) != len(self.element_id):
+            unknown = np.full(len(self.element_id), np.nan)
+            object.__setattr__(self, "curvature_variation", unknown)
 
     def __len__(self) -> int:
         """Return the number of profiles."""
@@ -259,6 +274,11 @@ class Profiles:
     def flattening(self) -> Array:
         """1 - semi-minor / semi-major (paper, section 3.3.1)."""
         return 1.0 - self.semi_minor / self.semi_major
+
+    @property
+    def minor_drop(self) -> Array:
+        """How much the semi-minor axis lies below the element's radius (paper, figure 13)."""
+        return np.asarray(self.radius - self.radius_deviation - self.semi_minor)
 
     def of_element(self, element_id: int, stack_id: int | None = None) -> "Profiles":
         """Return the rows of one element, of one stack if given."""
@@ -321,6 +341,9 @@ class Deformation:
         Magnitude (outward for a bulge) against the undented contour, metres.
     length, width : float
         Extent along the axis and around the circumference, metres.
+    area, volume : float
+        Of a dent or bulge: what it covers of the undented surface (m²), and what lies
+        between the two surfaces (m³); nan for the other kinds.
     ovality, strain : float
         As ratios; nan where they do not apply or cannot be measured.
     n_points : int
@@ -329,6 +352,20 @@ class Deformation:
     verdict : Verdict
     significance : float
         Depth in units of its own noise.
+    fitting_id : int
+        The nearest flange, bend or other fitting of the run, `NO_ID` if it has none; the
+        own element's id if the deformation lies on a fitting.
+    fitting_distance : float
+        Distance along the run from the peak to where that begins, metres; 0 on a fitting.
+    next_id : int
+        The nearest other dent or bulge of the run, `NO_ID` if there is none.
+    next_distance : float
+        Distance over the surface from edge to edge of the two, metres; 0 if they overlap.
+    interacts : bool
+        Whether that is at most one outside diameter.
+    not_measurable : mapping of str to str
+        Why what is nan could not be measured, by the name of the field; what does not
+        apply to the kind is not in it. Empty where all was measured.
     """
 
     deformation_id: int
@@ -349,6 +386,14 @@ class Deformation:
     rule: str = ""
     verdict: Verdict = Verdict.NOT_MEASURABLE
     significance: float = np.nan
+    area: float = np.nan
+    volume: float = np.nan
+    fitting_id: int = NO_ID
+    fitting_distance: float = np.nan
+    next_id: int = NO_ID
+    next_distance: float = np.nan
+    interacts: bool = False
+    not_measurable: Mapping[str, str] = field(default_factory=dict)
 
 
 class ReviewState(StrEnum):

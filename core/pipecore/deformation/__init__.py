@@ -2,6 +2,8 @@
 
 from pipecore.deformation.deviation_map import DeviationMap, Grid
 from pipecore.deformation.finding import DeformationFinding, find_deformations
+from pipecore.deformation.profile_signals import curvature_variations
+from pipecore.deformation.relations import relate_deformations
 from pipecore.deformation.section_curve import SectionCurve, fit_section
 
 __all__ = [
@@ -9,6 +11,8 @@ __all__ = [
     "DeviationMap",
     "Grid",
     "SectionCurve",
+    "curvature_variations",
     "find_deformations",
     "fit_section",
+    "relate_deformations",
 ]

@@ -51,7 +51,8 @@ class Bump:
     `height` is signed (outward positive); `curvature_along` and `curvature_around` are
     the magnitudes of the second derivatives at the peak of the cosine (1/metres). `misfit`
     is the root mean square of the residuals under it in units of their noise, `noise` the
-    standard deviation of the height of a bump whose place and form are known.
+    standard deviation of the height of a bump whose place and form are known. `volume`
+    (metres³, positive) lies between the bump and the undeformed surface.
     """
 
     along: float
@@ -65,6 +66,12 @@ class Bump:
     misfit: float
     noise: float
     n_points: int
+    volume: float
+
+    @property
+    def area(self) -> float:
+        """Area of its ellipse on the undeformed surface, metres²."""
+        return float(np.pi / 4 * self.length * self.width)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +82,17 @@ class _Fit:
     covariance: Array
     chi2: float
     shape: Shape
+
+    @property
+    def exponent(self) -> float:
+        """The q of its shape."""
+        return float(np.exp(self.parameters[6])) if len(self.parameters) > 6 else 1.0
+
+    @property
+    def mean_share(self) -> float:
+        """Mean height over the ellipse as a share of the peak's: ∫ 2ρ b(ρ) dρ."""
+        rho = (np.arange(200) + 0.5) / 200
+        return float(np.mean(2 * rho * self.shape(rho, self.exponent)))
 
     @property
     def aic(self) -> float:
@@ -151,6 +169,7 @@ def fit_bump(
             (along - along_peak, around - around_peak, noise * inflation), length, width
         ),
         n_points=int(np.count_nonzero(inside < 1)),
+        volume=float(abs(height) * np.pi / 4 * length * width * best.mean_share),
     )
 
 
@@ -173,8 +192,8 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     core = rho < CORE
     if np.count_nonzero(core) < 3:
         return np.inf
-    q = float(np.exp(p[6])) if len(p) > 6 else 1.0
-    residual = (deviation - p[0] * fit.shape(rho, q) - p[5])[core] / noise[core]
+    model = p[0] * fit.shape(rho, fit.exponent) + p[5]
+    residual = (deviation - model)[core] / noise[core]
     return float(np.sqrt(np.mean(residual**2)))
 
 

@@ -1,11 +1,12 @@
 """From the points around one element to its deformations: the steps in their order."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.deformation.bump import Bump
 from pipecore.deformation.centre_line import MIN_BOW_RATIO, measure_centre_line
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
@@ -32,6 +33,9 @@ STRAIN_SIGNIFICANCE = 5.0
 MIN_BOW_LENGTH = 6.0
 """In diameters: the line of a shorter stub hangs on what touches it."""
 
+MAX_OVALITY_SD = 0.01
+"""Ovality known less well than to a percentage point is no number for an inspector."""
+
 MIN_EXPLAINED = 0.7
 """A bent pipe is bent in one bow or kink, which explains this share of its line's variation."""
 
@@ -54,6 +58,8 @@ class DeformationFinding:
         Of the mean section, ratios; nan where the arc cannot carry it.
     straightness : float
         Largest distance of the measured axis from its chord, metres; nan if unknown.
+    not_measurable : dict of str to str
+        Why the ovality or the straightness is nan where it would apply.
     """
 
     deformations: tuple[Deformation, ...]
@@ -63,6 +69,7 @@ class DeformationFinding:
     ovality: float = np.nan
     ovality_sd: float = np.nan
     straightness: float = np.nan
+    not_measurable: dict[str, str] = field(default_factory=dict)
 
 
 def find_deformations(
@@ -88,10 +95,15 @@ def find_deformations(
     surface = own_surface(element, points)
     if surface is None:
         return DeformationFinding(
-            (), np.full(len(xyz), np.nan, np.float32), np.zeros(len(xyz), bool), None
+            (),
+            np.full(len(xyz), np.nan, np.float32),
+            np.zeros(len(xyz), bool),
+            None,
+            not_measurable=dict.fromkeys(_applicable(element), "too few points"),
         )
     heights = _height_map(element, surface, neighbours)
-    n_terms = 5 if usable_arc(surface.grid, heights.covered) >= MIN_ARC else 3
+    arc = usable_arc(surface.grid, heights.covered)
+    n_terms = 5 if arc >= MIN_ARC else 3
 
     def search(knot_diameters: float) -> tuple[list[Patch], Contour]:
         return find_patches(
@@ -114,13 +126,11 @@ def find_deformations(
     deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
     least = settings.min_depth_mm / 1000
     deformations = [d for d in deformations if d.depth >= max(least, 3 * d.depth_sd)]
-    ovality = ovality_sd = np.nan
-    if n_terms == 5:
-        ovality, ovality_sd = mean_ovality(contour)
-        deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
-    straightness = np.nan
+    ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
+    deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
+    straightness, why_not_straight = np.nan, ""
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
-        straightness, bow = _measure_bow(
+        straightness, why_not_straight, bow = _measure_bow(
             element, surface, heights, patches, n_terms=n_terms, settings=settings
         )
         deformations = [d for d in deformations if not _is_of_kink(d, bow, surface.grid)] + bow
@@ -139,7 +149,30 @@ def find_deformations(
         ovality,
         ovality_sd,
         straightness,
+        {
+            name: why
+            for name, why in {"ovality": why_no_ovality, "straightness": why_not_straight}.items()
+            if why and name in _applicable(element)
+        },
     )
+
+
+def _applicable(element: Element) -> tuple[str, ...]:
+    """What is measured of an element as a whole, if the scan carries it."""
+    if element.kind not in SEARCHED:
+        return ()
+    return ("ovality", "straightness") if isinstance(element.axis, LineAxis) else ("ovality",)
+
+
+def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, str]:
+    """Ovality of the mean section with its standard deviation, or why it cannot be told."""
+    if contour.n_terms < 5:
+        seen, needed = np.rad2deg(arc), np.rad2deg(MIN_ARC)
+        return np.nan, np.nan, f"{seen:.0f}° of arc seen, {needed:.0f}° are needed"
+    ovality, sd = mean_ovality(contour)
+    if sd > MAX_OVALITY_SD:
+        return np.nan, np.nan, f"the noise allows no better than ± {100 * sd:.1f} %"
+    return ovality, sd, ""
 
 
 def _height_map(element: Element, surface: Surface, neighbours: Sequence[Element]) -> DeviationMap:
@@ -172,24 +205,14 @@ def _as_deformation(
     depth = abs(bump.height)
     radius = float(element.radius_at(patch.chainage))
     inside = patch.cells(grid).ravel()[surface.cell] & surface.belongs
-    strain = np.nan
-    wall = settings.wall_thickness_mm / 1000
-    if wall > 0 and bump.height < 0 and depth >= STRAIN_SIGNIFICANCE * bump.height_sd:
-        strain = dent_strain(
-            depth=depth,
-            length=bump.length,
-            curvature_along=bump.curvature_along,
-            curvature_around=bump.curvature_around,
-            radius=radius,
-            wall=wall,
-        )
+    strain, why = _strain(bump, radius, settings.wall_thickness_mm / 1000)
     return Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
         kind=DeformationKind.DENT if bump.height < 0 else DeformationKind.BULGE,
         chainage=patch.chainage,
-        chainage_start=max(patch.chainage - bump.length / 2, 0.0),
-        chainage_end=min(patch.chainage + bump.length / 2, element.axis.length),
+        chainage_start=max(patch.chainage - patch.span / 2, 0.0),
+        chainage_end=min(patch.chainage + patch.span / 2, element.axis.length),
         clock=patch.clock,
         peak=_peak(element, contour, patch.chainage, patch.clock, bump.height),
         depth=depth,
@@ -199,7 +222,30 @@ def _as_deformation(
         strain=strain,
         n_points=int(np.count_nonzero(inside)),
         significance=abs(patch.z),
+        area=bump.area,
+        volume=bump.volume,
+        not_measurable=why,
     )
+
+
+def _strain(bump: Bump, radius: float, wall: float) -> tuple[float, dict[str, str]]:
+    """Strain of a dent, or why it cannot be told; neither for a bulge."""
+    if bump.height > 0:
+        return np.nan, {}
+    if wall == 0:
+        return np.nan, {"strain": "the wall thickness is not set"}
+    if abs(bump.height) < STRAIN_SIGNIFICANCE * bump.height_sd:
+        least = f"{STRAIN_SIGNIFICANCE:g} standard deviations"
+        return np.nan, {"strain": f"the depth is less than {least}"}
+    strain = dent_strain(
+        depth=abs(bump.height),
+        length=bump.length,
+        curvature_along=bump.curvature_along,
+        curvature_around=bump.curvature_around,
+        radius=radius,
+        wall=wall,
+    )
+    return strain, {}
 
 
 def _is_of_ovality(patch: Patch, stretches: list[OvalStretch], grid: Grid) -> bool:
@@ -257,8 +303,8 @@ def _measure_bow(
     *,
     n_terms: int,
     settings: DeformationSettings,
-) -> tuple[float, list[Deformation]]:
-    """Straightness, and the bow or kink if it is one."""
+) -> tuple[float, str, list[Deformation]]:
+    """Straightness or why it cannot be told, and the bow or kink if it is one."""
     grid = surface.grid
     used = heights.count > 0
     for patch in patches:
@@ -270,12 +316,13 @@ def _measure_bow(
     line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
     if line.straightness_sd > settings.min_depth_mm / 1000:
-        return np.nan, []
+        why = f"the centre line is known to ± {1000 * line.straightness_sd:.0f} mm only"
+        return np.nan, why, []
     if line.straightness < max(least, settings.significance * line.straightness_sd):
-        return line.straightness, []
+        return line.straightness, "", []
     is_short = grid.length < MIN_BOW_LENGTH * 2 * grid.radius
     if is_short or line.explained < MIN_EXPLAINED:
-        return line.straightness, []
+        return line.straightness, "", []
     deformation = Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
@@ -292,7 +339,7 @@ def _measure_bow(
         n_points=int(np.count_nonzero(surface.belongs)),
         significance=line.straightness / line.straightness_sd,
     )
-    return line.straightness, [deformation]
+    return line.straightness, "", [deformation]
 
 
 def _peak(

@@ -1,6 +1,6 @@
 """Dents and bulges: found on the map, measured on the points, kept if they are closed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,20 +33,33 @@ MAX_MISFIT = 1.8
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """A fitted bump at its place on a pipe of `radius`; `z` is its height over its noise."""
+    """A fitted bump at its place on a pipe of `radius`; `z` is its height over its noise.
+
+    `scale` is the length on the surface per chainage, which differs from 1 in a bend.
+    `n_closed` counts the sides, of four, on which it is seen to come back to the contour.
+    """
 
     chainage: float
     clock: float
     radius: float
     bump: Bump
     z: float
-    is_enclosed: bool
+    scale: float
+    n_closed: int = 0
+
+    @property
+    def is_enclosed(self) -> bool:
+        """Whether enough of it is seen."""
+        return self.n_closed >= (3 if self.bump.height < 0 else 4)
+
+    @property
+    def span(self) -> float:
+        """Chainage that it covers, metres."""
+        return self.bump.length / self.scale
 
     def cells(self, grid: Grid, scale: float = 1.0) -> Flags:
         """Cells within the extent, scaled."""
-        return disc(
-            grid, self.chainage, self.clock, scale * self.bump.length, scale * self.bump.width
-        )
+        return disc(grid, self.chainage, self.clock, scale * self.span, scale * self.bump.width)
 
 
 def find_patches(
@@ -107,9 +120,9 @@ def _measure(
 ) -> Patch | None:
     grid, points = surface.grid, surface.points
     reach = 2.5 * max(seen.length, seen.width)
-    scale = stretch(element, seen.clock)
+    scale = float(stretch(element, seen.clock))
     radius = float(element.radius_at(seen.chainage))
-    along = (points.chainage - seen.chainage) * scale
+    along = (points.chainage - seen.chainage) * stretch(element, points.clock)
     near = np.flatnonzero(surface.belongs & (np.abs(along) < reach))
     turn = np.mod(points.clock[near] - seen.clock + np.pi, 2 * np.pi) - np.pi
     near, turn = near[np.abs(turn) * radius < reach], turn[np.abs(turn) * radius < reach]
@@ -131,19 +144,15 @@ def _measure(
     )
     if bump is None:
         return None
-    chainage = seen.chainage + bump.along / scale
     clock = float(np.mod(seen.clock + bump.around / radius, 2 * np.pi))
+    scale = float(stretch(element, clock))
+    chainage = seen.chainage + bump.along / scale
     # Noise alone gains one unit of z² by each of the four parameters of place and size.
     z_squared = bump.height**2 / (bump.noise**2 + contour_sd**2) - 4.0
     z = float(np.sign(bump.height) * np.sqrt(max(z_squared, 0.0)))
-    return Patch(
-        chainage,
-        clock,
-        radius,
-        bump,
-        z,
-        _is_enclosed(cells, cells.deviation - contour.height, chainage, clock, bump),
-    )
+    patch = Patch(chainage, clock, radius, bump, z, scale)
+    n_closed = _seen_sides(cells, cells.deviation - contour.height, patch)
+    return replace(patch, n_closed=n_closed)
 
 
 def _shares(
@@ -172,11 +181,9 @@ def _closed_sides(
     return sum(int(np.count_nonzero(covered & side) > 0.5 * expected) for side in sides)
 
 
-def _returns(
-    cells: DeviationMap, deviation: Array, chainage: float, clock: float, bump: Bump
-) -> int:
+def _returns(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
     """On how many of its four sides the surface is back at the contour beyond a bump."""
-    u, v = _shares(cells.grid, chainage, clock, bump.length, bump.width)
+    u, v = _shares(cells.grid, patch.chainage, patch.clock, patch.span, patch.bump.width)
     distance = np.hypot(u, v)
     ring = (distance > 1.0) & (distance < 1.5) & (cells.count > 0)
     n_back = 0
@@ -186,31 +193,30 @@ def _returns(
         if weight.sum() > 0:
             mean = float(np.average(deviation[there], weights=weight))
             least = 2.5 / np.sqrt(weight.sum())
-            n_back += abs(mean) < max(RETURN * abs(bump.height), least)
+            n_back += abs(mean) < max(RETURN * abs(patch.bump.height), least)
     return n_back
 
 
-def _is_enclosed(
-    cells: DeviationMap, deviation: Array, chainage: float, clock: float, bump: Bump
-) -> bool:
-    """Whether a bump is seen at its peak and the surface comes back to the contour around it.
+def _seen_sides(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
+    """On how many sides a bump is seen to come back to the contour, 0 if it is no bump.
 
     A dent may be cut off on one side by the edge of what was scanned. A bulge may not,
     nor have another surface near: things that touch a pipe look like that.
     """
-    if not 0 < chainage < cells.grid.length or bump.n_points < MIN_POINTS:
-        return False
-    distance = np.hypot(*_shares(cells.grid, chainage, clock, bump.length, bump.width))
+    bump = patch.bump
+    if not 0 < patch.chainage < cells.grid.length or bump.n_points < MIN_POINTS:
+        return 0
+    place = (patch.chainage, patch.clock, patch.span, bump.width)
+    distance = np.hypot(*_shares(cells.grid, *place))
     centre, inside = distance < 0.5, distance < 1.1
     if np.count_nonzero(cells.covered & centre) <= 0.6 * np.count_nonzero(centre):
-        return False
-    n_closed = _closed_sides(cells, chainage, clock, bump.length, bump.width)
-    n_closed = min(n_closed, _returns(cells, deviation, chainage, clock, bump))
-    if bump.height < 0:
-        return n_closed >= 3
-    disputed = np.count_nonzero(dilate(cells.disputed) & inside)
-    is_own = disputed < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
-    return n_closed == 4 and bool(is_own)
+        return 0
+    n_closed = min(_closed_sides(cells, *place), _returns(cells, deviation, patch))
+    if bump.height > 0:
+        disputed = np.count_nonzero(dilate(cells.disputed) & inside)
+        is_own = disputed < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
+        return n_closed if is_own else 0
+    return n_closed
 
 
 def _without_overlap(patches: list[Patch]) -> list[Patch]:
@@ -224,6 +230,6 @@ def _without_overlap(patches: list[Patch]) -> list[Patch]:
 
 def _holds(outer: Patch, inner: Patch) -> bool:
     turn = np.mod(inner.clock - outer.clock + np.pi, 2 * np.pi) - np.pi
-    u = (inner.chainage - outer.chainage) / (outer.bump.length / 2)
+    u = (inner.chainage - outer.chainage) / (outer.span / 2)
     v = turn * outer.radius / (outer.bump.width / 2)
     return bool(u**2 + v**2 < 1.0)

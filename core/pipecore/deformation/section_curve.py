@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 
 from pipecore.ellipses.nonlinear import NoFit
 from pipecore.geometry import Array
@@ -187,8 +187,11 @@ def fit_section(
     robust = np.ones(len(theta))
     freedom = max(len(theta) - basis.shape[1], 1) / len(theta)
     for _ in range(N_ROUNDS):
-        root = np.sqrt(weight * robust)
-        solution = np.linalg.lstsq(basis * root[:, None], r * root, rcond=1e-10)[0]
+        weighted = (weight * robust)[:, None] * basis
+        normal = weighted.T @ basis
+        # On open arcs waves look alike; a hair of ridge is enough to find who strays.
+        normal.flat[:: len(normal) + 1] += 1e-9 * normal[0, 0]
+        solution = cho_solve(cho_factor(normal), weighted.T @ r)
         residual = np.abs(r - basis @ solution) * np.sqrt(weight)
         scale = max(1.4826 * float(np.median(residual)) / np.sqrt(freedom), 1e-12)
         robust = np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 1e-6, None) ** 2
@@ -207,8 +210,7 @@ def _by_criterion(
 ) -> SectionCurve:
     """The order with the least criterion: all of them from one orthogonal decomposition."""
     root, n = np.sqrt(weight), int(np.sum(weight))
-    q, upper = np.linalg.qr(basis * root[:, None])
-    parts = q.T @ (r * root)
+    upper, parts = _orthogonalise(basis * root[:, None], r * root)
     max_order = (basis.shape[1] - 1) // 2
     # Sum of squares that is left with the first 2k + 1 terms.
     left = float(np.sum((r * root) ** 2)) - np.cumsum(parts**2)[::2] + within
@@ -218,16 +220,43 @@ def _by_criterion(
     order = int(np.argmin(aic))
     size = 2 * order + 1
     noise = float(np.sqrt(left[order] / max(n - size, 1)))
-    triangle = upper[:size, :size]
+    inverse = _inverted(upper[:size, :size])
     return SectionCurve(
-        coefficients=np.asarray(solve_triangular(triangle, parts[:size])),
-        root=noise * np.asarray(solve_triangular(triangle, np.eye(size))),
+        coefficients=inverse @ parts[:size],
+        root=noise * inverse,
         order=order,
         aic_by_order=aic,
         noise=noise,
         spans=spans,
         n_points=n,
     )
+
+
+def _orthogonalise(a: Array, b: Array) -> tuple[Array, Array]:
+    """Triangle R of a = Q R, and Qᵀ b: modified Gram-Schmidt, stable with b taken along.
+
+    The library's routines start threads even for so few columns, and wait for them longer
+    than they compute.
+    """
+    rest = np.column_stack([a, b])
+    n = a.shape[1]
+    upper = np.zeros((n, n + 1))
+    for k in range(n):
+        upper[k, k] = np.sqrt(rest[:, k] @ rest[:, k])
+        rest[:, k] /= upper[k, k]
+        upper[k, k + 1 :] = rest[:, k] @ rest[:, k + 1 :]
+        rest[:, k + 1 :] -= rest[:, k, None] * upper[k, k + 1 :]
+    return upper[:, :n], upper[:, n]
+
+
+def _inverted(upper: Array) -> Array:
+    """Inverse of a triangle, from its last row up."""
+    inverse = np.zeros_like(upper)
+    for i in range(len(upper) - 1, -1, -1):
+        inverse[i] = -upper[i, i + 1 :] @ inverse[i + 1 :]
+        inverse[i, i] += 1.0
+        inverse[i] /= upper[i, i]
+    return inverse
 
 
 def _basis(theta: Array, order: int, derivative: int = 0) -> Array:

@@ -66,11 +66,12 @@ def surface_distance(element: Element, xyz: Array) -> Array:
     return np.asarray(np.hypot(distance - element.radius_at(within), chainage - within))
 
 
-def stretch(element: Element, clock: float) -> float:
+def stretch(element: Element, clock: Array | float) -> Array:
     """Length on the surface per chainage: 1, but more outside and less inside of a bend."""
-    axis = element.axis
+    axis, theta = element.axis, np.asarray(clock, dtype=np.float64)
     if not isinstance(axis, ArcAxis):
-        return 1.0
+        return np.ones_like(theta)
     up, right = axis.frame(0.0)
-    outward = float((np.cos(clock) * up + np.sin(clock) * right) @ axis.towards_start)
-    return 1.0 + element.radius * outward / axis.bend_radius
+    up_part, right_part = up @ axis.towards_start, right @ axis.towards_start
+    outward = np.cos(theta) * up_part + np.sin(theta) * right_part
+    return np.asarray(1.0 + element.radius * outward / axis.bend_radius)

@@ -112,6 +112,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
         Column("Clock"),
         Column("Length × width (mm)"),
         Column(f"Position x, y, z ({place.unit})"),
+        Column("Remarks", numeric=False),
     ]
     has_strain = any(np.isfinite(d.strain) for d in result.deformations)
     if has_strain:
@@ -131,9 +132,27 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
             format_clock(d.clock),
             f"{_whole_mm(d.length)} × {_whole_mm(d.width)}",
             place.spoken(d.peak),
+            "; ".join(_remarks(d, result)),
         ]
         rows.append(row + ([_number_or_blank(100 * d.strain)] if has_strain else []))
     return {"columns": columns, "rows": rows}
+
+
+def _remarks(d: Deformation, result: Result) -> list[str]:
+    """How it lies to fittings and other dents, and why something could not be measured."""
+    remarks = []
+    if d.fitting_id == d.element_id:
+        remarks.append("on a fitting")
+    elif d.fitting_id:
+        fitting = result.element(d.fitting_id).label
+        remarks.append(f"{d.fitting_distance:.2f} m to {fitting}")
+    if d.next_id:
+        relation = "interacts with" if d.interacts else "next dent:"
+        remarks.append(f"{relation} {d.next_id}, {_whole_mm(d.next_distance)} mm away")
+    wanted = {name: why for name, why in d.not_measurable.items() if name != "strain"}
+    if result.settings.deformation.wall_thickness_mm > 0:
+        wanted = dict(d.not_measurable)
+    return remarks + [f"{name} {NOT_MEASURABLE}: {why}" for name, why in wanted.items()]
 
 
 def _depth_pct_od(d: Deformation, element: Element) -> str:
@@ -193,11 +212,16 @@ def _element_table(result: Result) -> dict[str, Any]:
                 format_measure(e.axis.length, decimals=2),
                 f"{np.rad2deg(e.arc):.0f}",
                 format_measure(1000 * e.rms),
-                format_measure(100 * e.ovality, 100 * e.ovality_sd),
-                _number_or_blank(1000 * e.straightness),
+                _value_or_reason(e, "ovality", format_measure(100 * e.ovality, 100 * e.ovality_sd)),
+                _value_or_reason(e, "straightness", _number_or_blank(1000 * e.straightness)),
             ]
         )
     return {"columns": columns, "rows": rows}
+
+
+def _value_or_reason(element: Element, name: str, value: str) -> str:
+    why = element.not_measurable.get(name)
+    return f"{NOT_MEASURABLE}: {why}" if why else value
 
 
 def _bend(element: Element) -> str:
@@ -235,6 +259,8 @@ def _where(d: Deformation, place: FileCoordinates) -> list[str]:
     ]
     if np.isfinite(d.clock):
         parts.append(f"{format_clock(d.clock)} o’clock")
+    if np.isfinite(d.area) and np.isfinite(d.volume):
+        parts.append(f"{1e4 * d.area:.0f} cm², {1e6 * d.volume:.0f} cm³")
     return [*parts, place.spoken(d.peak)]
 
 

@@ -53,6 +53,7 @@ ELEMENT_COLUMNS = (
     "n_deformations",
     "n_gaps",
     "gaps_m",
+    "not_measurable",
 )
 
 PROFILE_COLUMNS = (
@@ -77,6 +78,8 @@ PROFILE_COLUMNS = (
     "aic_line",
     "aic_ellipse",
     "semi_minor_sd_mm",
+    "semi_minor_drop_mm",
+    "curvature_variation",
 )
 
 DEFORMATION_COLUMNS = (
@@ -100,6 +103,14 @@ DEFORMATION_COLUMNS = (
     "n_points",
     "rule",
     "verdict",
+    "area_mm2",
+    "volume_mm3",
+    "fitting_id",
+    "fitting_distance_m",
+    "next_id",
+    "next_distance_m",
+    "interacts",
+    "not_measurable",
     "review",
     "comment",
 )
@@ -200,6 +211,7 @@ def _element_row(element: Element, result: Result, place: FileCoordinates) -> li
         str(len(result.deformations_of(element.element_id))),
         str(len(element.gaps)),
         cell(sum(end - start for start, end in element.gaps), 4),
+        _reasons(element.not_measurable),
     ]
 
 
@@ -225,7 +237,19 @@ def _deformation_row(
         str(deformation.n_points),
         text_cell(deformation.rule),
         deformation.verdict,
+        cell(1e6 * deformation.area, 0),
+        cell(1e9 * deformation.volume, 0),
+        str(deformation.fitting_id or ""),
+        cell(deformation.fitting_distance, 4),
+        str(deformation.next_id or ""),
+        cell(deformation.next_distance, 4),
+        ("yes" if deformation.interacts else "no") if deformation.next_id else "",
+        _reasons(deformation.not_measurable),
     ]
+
+
+def _reasons(reasons: Mapping[str, str]) -> str:
+    return text_cell("; ".join(f"{name}: {why}" for name, why in reasons.items()))
 
 
 def _review_cells(review: Review) -> list[str]:
@@ -271,4 +295,6 @@ def _profile_columns(p: Profiles, place: FileCoordinates) -> list[list[str]]:
         column(p.aic_line, 1, 2),
         column(p.aic_ellipse, 1, 2),
         column(p.semi_minor_sd, 1000, 3),
+        column(p.minor_drop, 1000, 2),
+        column(p.curvature_variation, 1, 3),
     ]

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore.deformation import find_deformations
+from pipecore.geometry import surface_points
 from pipecore.settings import DeformationSettings
 from pipecore.types import DeformationKind
 from tests.core.deformation.sampler import PipeScan, PipeScene, bump, oval
@@ -200,3 +201,74 @@ def test_that_holes_in_the_coverage_stay_holes(rng):
     hole = np.abs(finding.map.grid.chainages - 1.05) < 0.1
     assert np.isnan(finding.map.deviation[hole]).all()
     assert not finding.map.covered[hole].any()
+
+
+@pytest.mark.parametrize("side", [0.0, np.pi], ids=["12 of the bend", "6 of the bend"])
+def test_that_the_extent_of_a_dent_in_a_bend_is_told_in_chainage_and_on_the_surface(rng, side):
+    found = []
+    for _ in range(5):
+        scene = PipeScene(radius=0.11, length=0.8, bend_radius=0.4, views=(side,))
+        scene.shapes = [bump(0.4, side, -0.015, length=0.14, width=0.12, r=0.11)]
+        scan = scene.scan(rng)
+        (dent,) = find(scan).deformations
+        ahead = surface_points(scan.element.axis, [0.3995, 0.4005], 0.11, side)
+        on_surface = float(np.linalg.norm(ahead[1] - ahead[0])) / 0.001
+        span = dent.chainage_end - dent.chainage_start
+        assert span * on_surface == pytest.approx(dent.length, rel=0.02)
+        assert dent.chainage == pytest.approx(0.4, abs=0.015)
+        found.append(span)
+    assert np.median(found) == pytest.approx(0.14, rel=0.12)
+
+
+def test_that_area_and_volume_are_those_of_the_dent(rng):
+    found = []
+    for _ in range(6):
+        (dent,) = find(dented(-0.02, size=0.16).scan(rng)).deformations
+        found.append((dent.area, dent.volume))
+    area, volume = np.mean(found, axis=0)
+    assert area == pytest.approx(np.pi / 4 * 0.16**2, rel=0.1)
+    # Under a cosine bell of height one over a disc of radius one lies π (1/2 - 2/π²).
+    assert volume == pytest.approx(0.02 * 0.08**2 * np.pi * (0.5 - 2 / np.pi**2), rel=0.1)
+
+
+def test_that_what_is_not_measurable_has_its_reason(rng):
+    half_seen = find(PipeScene(radius=0.11, length=2.0).scan(rng))
+    assert "of arc seen, 200° are needed" in half_seen.not_measurable["ovality"]
+    assert "straightness" not in half_seen.not_measurable
+    round_seen = find(PipeScene(radius=0.11, length=2.0, views=(0.0, 2.2)).scan(rng))
+    assert round_seen.not_measurable == {}
+    scan = dented().scan(rng)
+    few = find(replace(scan, xyz=scan.xyz[:20], normals=scan.normals[:20]))
+    assert few.not_measurable == {"ovality": "too few points", "straightness": "too few points"}
+
+
+def test_that_a_centre_line_less_sure_than_what_is_looked_for_is_no_number(rng):
+    scan = PipeScene(radius=0.11, length=1.0).scan(rng)
+    fine = find(scan, DeformationSettings(min_depth_mm=0.1))
+    assert np.isnan(fine.straightness)
+    assert "the centre line is known to" in fine.not_measurable["straightness"]
+    assert np.isfinite(find(scan).straightness)
+
+
+def test_that_an_ovality_known_to_worse_than_a_percentage_point_is_no_number(rng):
+    scene = PipeScene(radius=0.04, length=0.3, views=(0.0, 1.0), noise=0.006, spacing=0.02)
+    for _ in range(5):
+        finding = find(scene.scan(rng))
+        known = np.isfinite(finding.ovality)
+        assert known == ("ovality" not in finding.not_measurable)
+        assert not known or finding.ovality_sd <= 0.01
+
+
+def test_that_a_dent_without_strain_says_why(rng):
+    scan = dented(-0.015).scan(rng)
+    (unset,) = find(scan).deformations
+    assert unset.not_measurable == {"strain": "the wall thickness is not set"}
+    (known,) = find(scan, DeformationSettings(wall_thickness_mm=5.0)).deformations
+    assert known.not_measurable == {}
+    shallow = dented(-0.0055, noise=0.003).scan(rng)
+    for found in find(
+        shallow, DeformationSettings(wall_thickness_mm=5.0, significance=2.0)
+    ).deformations:
+        if found.kind is DeformationKind.DENT and found.depth < 5 * found.depth_sd:
+            assert "standard deviations" in found.not_measurable["strain"]
+            assert np.isnan(found.strain)

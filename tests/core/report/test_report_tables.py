@@ -133,6 +133,13 @@ def test_that_the_deformations_table_gives_back_what_was_measured(tmp_path):
         assert number(row["depth_sd_mm"]) == pytest.approx(1000 * d.depth_sd, abs=0.0005)
         assert position(row, "peak") == pytest.approx(d.peak + result.origin, abs=6e-5)
         assert row["strain_pct"] == ""
+        assert number(row["area_mm2"]) == pytest.approx(1e6 * d.area, abs=0.5, nan_ok=True)
+        assert number(row["volume_mm3"]) == pytest.approx(1e9 * d.volume, abs=0.5, nan_ok=True)
+        assert row["fitting_id"] == (str(d.fitting_id) if d.fitting_id else "")
+        assert number(row["fitting_distance_m"]) == pytest.approx(
+            d.fitting_distance, abs=5.1e-5, nan_ok=True
+        )
+        assert row["interacts"] == ("" if not d.next_id else "yes" if d.interacts else "no")
     dent, ovality = rows[0], rows[1]
     assert dent["clock"] == "1:20"  # 40°
     assert number(dent["depth_pct_od"]) == pytest.approx(100 * 12.1 / 168.3, abs=5e-4)

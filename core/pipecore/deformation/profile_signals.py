@@ -1,0 +1,59 @@
+"""What each profile across an element shows of a deformation (paper, figures 12 to 15).
+
+The deviation of the centre and the drop of the semi-minor axis stand in the table of
+profiles; here the smooth curve through each profile's points adds how its curvature varies.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipecore.deformation.section_curve import fit_section
+from pipecore.geometry import Array
+from pipecore.types import Element, Profiles
+
+
+def curvature_variations(
+    element: Element,
+    xyz: Array,
+    profiles: Profiles,
+    width: float,
+    check: Callable[[], None] = lambda: None,
+) -> Array:
+    """Return how much the curvature varies around each profile of an element's own stack.
+
+    Parameters
+    ----------
+    element : Element
+    xyz : ndarray, shape (n, 3)
+        Points of its surface.
+    profiles : Profiles
+        Of its own stack, m rows.
+    width : float
+        With which they were cut, metres.
+    check : callable
+        Called before each profile; may raise to cancel.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        See `SectionCurve.curvature_variation`; nan where the points carry no curve.
+    """
+    variation = np.full(len(profiles), np.nan)
+    if len(profiles) == 0:
+        return variation
+    chainage, rho, clock = element.axis.pipe_coordinates(xyz)
+    index = np.floor(chainage / width).astype(np.int64)
+    order = np.argsort(index, kind="stable")
+    index, rho, clock = index[order], rho[order], clock[order]
+    # A taper within a profile is no thickness of the section.
+    middle = np.asarray((index + 0.5) * width, np.float64)
+    rho = rho + (element.radius_at(middle) - element.radius_at(chainage[order]))
+    first = np.searchsorted(index, profiles.profile_index, side="left")
+    last = np.searchsorted(index, profiles.profile_index, side="right")
+    for row, (a, b) in enumerate(zip(first, last, strict=True)):
+        check()
+        curve = fit_section(clock[a:b], rho[a:b])
+        if curve:
+            variation[row] = curve.curvature_variation
+    return variation
