@@ -18,6 +18,9 @@ from pipegui.document import ColourBy, Document, ProfileKey, Scan, Selection, Vi
 
 Command = TypeVar("Command", bound=Callable[..., Document])
 
+MAX_PINNED = 6
+"""Elements that can be compared in one plot."""
+
 NEEDS_RESULT = {
     ColourBy.SEGMENT,
     ColourBy.ELEMENT,
@@ -57,6 +60,7 @@ def activate_scan(document: Document, index: int) -> Document:
     """Look at another scan."""
     document = replace(document, active=index, selection=Selection())
     view = replace(document.view, hidden_elements=frozenset(), shown_stack=NO_ID, clip_box=None)
+    view = replace(view, pinned_elements=())
     if document.scan is not None and view.colour_by not in colours_of(document.scan):
         view = replace(view, colour_by=colours_of(document.scan)[0])
     return replace(document, view=view)
@@ -89,6 +93,7 @@ def set_result(document: Document, cloud: PointCloud, result: Result) -> Documen
     if index == document.active:
         colour = view.colour_by if view.colour_by in NEEDS_RESULT else ColourBy.DEVIATION
         view = replace(view, colour_by=colour, hidden_elements=frozenset(), shown_stack=NO_ID)
+        view = replace(view, pinned_elements=())  # their numbers mean others now
         if colour is ColourBy.PROFILE:
             view = replace(view, colour_by=ColourBy.DEVIATION)
     return replace(document, scans=tuple(scans), selection=selection, view=view)
@@ -298,6 +303,18 @@ def show_plot_stack(document: Document, stack_id: int) -> Document:
     if profile is not None and profile.stack_id != stack_id:
         return select_parent(document)
     return document
+
+
+def toggle_pin(document: Document) -> Document:
+    """Keep the selected element in the radius plot, or no more; the oldest of too many goes."""
+    element_id, pinned = document.selection.element_id, document.view.pinned_elements
+    if not element_id:
+        return document
+    if element_id in pinned:
+        pinned = tuple(i for i in pinned if i != element_id)
+    else:
+        pinned = (*pinned, element_id)[-MAX_PINNED:]
+    return set_view(document, pinned_elements=pinned)
 
 
 @step("Show or hide")

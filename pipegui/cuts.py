@@ -4,13 +4,23 @@ Made once and kept for the few elements last looked at, because equality of view
 stands on their identity. Results themselves live in the history. Qt-free.
 """
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.errors import SettingsError
 from pipecore.geometry import Array
-from pipecore.types import OWN_STACK, Deformation, PointCloud, Profiles, Result
+from pipecore.rules import Measure, Rule, load_rule, outside_diameter
+from pipecore.types import (
+    OWN_STACK,
+    Deformation,
+    DeformationKind,
+    PointCloud,
+    Profiles,
+    Result,
+)
 from pipegui.document import ProfileKey
 
 
@@ -48,6 +58,48 @@ def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int]
         (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
     ]
     return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
+
+
+@lru_cache(maxsize=32)
+def plotted_profiles(result: Result, element_id: int) -> Profiles:
+    """Profiles of an element's own stack, or of that with most of them."""
+    rows, choices = profiles_of(result, element_id), stack_choices(result, element_id)
+    return rows[rows.stack_id == choices[0][0]] if choices else rows
+
+
+@dataclass(frozen=True)
+class DentLimit:
+    """How deep a dent may be, metres, and what says so."""
+
+    depth: float
+    text: str
+
+
+@lru_cache(maxsize=4)
+def _rule(name: str) -> Rule | None:
+    try:
+        return load_rule(name)
+    except SettingsError:  # the user's own file may be gone since
+        return None
+
+
+@lru_cache(maxsize=32)
+def dent_limit(result: Result, element_id: int) -> DentLimit | None:
+    """The strictest limit that the result's rule sets on the depth of an element's dents."""
+    rule, element = _rule(result.settings.deformation.rule), result.element(element_id)
+    if rule is None:
+        return None
+    in_metres = {
+        Measure.DEPTH_MM: 1e-3,
+        Measure.DEPTH_PCT_OD: outside_diameter(element) / 100,
+        Measure.DEPTH_PCT_LENGTH: element.axis.length / 100,
+    }
+    limits = [
+        DentLimit(criterion.limit * in_metres[criterion.measure], f"{rule.title}\n{criterion}")
+        for criterion in rule.criteria
+        if criterion.measure in in_metres and criterion.covers(DeformationKind.DENT, element)
+    ]
+    return min(limits, key=lambda limit: limit.depth, default=None)
 
 
 def stack_name(result: Result, stack_id: int) -> str:

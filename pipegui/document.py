@@ -80,6 +80,8 @@ class ViewOptions:
     """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
     plot_stack: int = OWN_STACK
     """The stack that the radius plot shows while no profile is selected."""
+    pinned_elements: tuple[int, ...] = ()
+    """Elements that stay in the radius plot."""
     fly: bool = True
     clip_box: Box | None = None
     """Only what lies within is shown."""

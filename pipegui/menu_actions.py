@@ -12,12 +12,13 @@ from pipecore.errors import PipecoreError, WriteError
 from pipecore.progress import Progress
 from pipecore.resources import resource
 from pipecore.settings import Settings
-from pipegui import commands, files
+from pipegui import commands, describe, files
 from pipegui.actions import SPECS
 from pipegui.command_search import CommandSearch
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
+    from pipegui.plots.chart import Chart
 
 CSV = "Tables (*.csv)"
 
@@ -120,6 +121,19 @@ class MenuActions:
                 raise WriteError("the folder cannot be written to.")
 
         self._save("Save picture", f"{self._stem()}.png", "Pictures (*.png)", write)
+
+    def save_plot(self, plot: "Chart", ending: str) -> None:
+        """Ask where to, and save a plot as a picture or as numbers."""
+        what = plot.accessibleName()
+        selected = describe.title(self._window.document.result, self._window.document.selection)
+        name = f"{self._stem()} {selected.replace(' · ', ' ')} {what.lower()}.{ending}"
+        names = {"png": "Pictures (*.png)", "svg": "Drawings (*.svg)", "csv": CSV}
+
+        def write(path: Path) -> None:
+            with pipecore.io.write_file(path) as temporary:
+                temporary.write_bytes(plot.as_file(ending))
+
+        self._save(f"Save {what.lower()}", name, names[ending], write)
 
     def export_report(self) -> None:
         """Ask where to, and write the whole report in the background."""

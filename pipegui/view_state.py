@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.geometry import twelve_o_clock
 from pipecore.settings import Settings, StackSettings
 from pipecore.types import (
     NO_ID,
@@ -29,12 +28,12 @@ from pipecore.types import (
 )
 from pipegui import cuts, selecting
 from pipegui.document import Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.section_cut import SectionCut, cut_section
 
 Array = NDArray[np.float64]
 
 NO_PROFILES = Profiles.empty()
 NOTHING = np.empty(0)
-NO_POINTS_UV = np.empty((0, 2))
 NO_POINTS = np.empty((0, 3))
 
 
@@ -70,6 +69,14 @@ class SceneState(_ComparedByParts):
 
 
 @dataclass(frozen=True, eq=False)
+class Pinned(_ComparedByParts):
+    """An element that stays in the radius plot, with the profiles shown of it."""
+
+    element: Element
+    profiles: Profiles
+
+
+@dataclass(frozen=True, eq=False)
 class RadiusPlotState(_ComparedByParts):
     """The radius-against-profile plot of the selected element.
 
@@ -87,6 +94,12 @@ class RadiusPlotState(_ComparedByParts):
     deformations : tuple of Deformation
         Those of the element.
     selected_deformation : int
+    pinned : tuple of Pinned
+        Elements to compare with, the present one not among them.
+    is_pinned : bool
+        Whether the present element stays in the plot when another is selected.
+    dent_limit : DentLimit, optional
+        How deep a dent of the element may be by the rule of the settings.
     """
 
     element: Element | None = None
@@ -96,22 +109,14 @@ class RadiusPlotState(_ComparedByParts):
     selected_index: int | None = None
     deformations: tuple[Deformation, ...] = ()
     selected_deformation: int = NO_ID
+    pinned: tuple[Pinned, ...] = ()
+    is_pinned: bool = False
+    dent_limit: cuts.DentLimit | None = None
 
     @property
     def shown(self) -> Profiles:
         """The rows of the chosen stack, in order of chainage."""
         return self.profiles[self.profiles.stack_id == self.stack_id]
-
-
-@dataclass(frozen=True, eq=False)
-class Ellipse:
-    """An ellipse in a profile's plane: millimetres, u to 3:00, v to 12:00."""
-
-    centre_uv: tuple[float, float]
-    semi_major_mm: float
-    semi_minor_mm: float
-    angle_rad: float
-    """Of the major axis, counter-clockwise from u."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,13 +128,8 @@ class SectionState(_ComparedByParts):
     element : Element, optional
     profile : Profiles, optional
         A table of one row, or None if no profile is selected.
-    points_uv : ndarray, shape (n, 2)
-        The profile's points in its plane relative to the centre of its ellipse,
-        millimetres; u points to 3:00 and v to 12:00, looking along the chainage.
-    fitted : Ellipse, optional
-        The profile's own ellipse.
-    reference : Ellipse, optional
-        The element's undeformed contour in this plane.
+    cut : SectionCut, optional
+        Its points and contours in its plane.
     position, count : int
         This is profile `position` (from 1) of `count` in its stack.
     stack_name : str
@@ -139,9 +139,7 @@ class SectionState(_ComparedByParts):
 
     element: Element | None = None
     profile: Profiles | None = None
-    points_uv: Array = field(default_factory=lambda: NO_POINTS_UV)
-    fitted: Ellipse | None = None
-    reference: Ellipse | None = None
+    cut: SectionCut | None = None
     position: int = 0
     count: int = 0
     stack_name: str = ""
@@ -292,6 +290,13 @@ def _element_states(
         selected_index=shown.profile_index if shown and shown.stack_id == stack_id else None,
         deformations=deformations,
         selected_deformation=selection.deformation_id,
+        pinned=tuple(
+            Pinned(result.element(i), cuts.plotted_profiles(result, i))
+            for i in view.pinned_elements
+            if i != element.element_id and any(e.element_id == i for e in result.elements)
+        ),
+        is_pinned=element.element_id in view.pinned_elements,
+        dent_limit=cuts.dent_limit(result, element.element_id),
     )
     if profile is None or shown is None:
         section = SectionState(element=element)
@@ -313,48 +318,17 @@ def _element_states(
 
 @lru_cache(maxsize=8)
 def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> SectionState:
-    """The profile's points carried along the element's axis into the profile's plane."""
-    element = result.element(element_id)
+    """The section of a profile of the element."""
     profile = cuts.profile_at(result, element_id, key)
     assert profile is not None
-    chainage, centre = float(profile.chainage[0]), profile.centre[0]
-    tangent, normal = element.axis.tangent(chainage), profile.normal[0]
-    if normal @ tangent < 0:
-        normal = -normal
-    up = twelve_o_clock(normal)
-    right = np.cross(normal, up)
-    tilt = float(normal @ tangent)
-
-    def in_plane(points: Array) -> Array:
-        offset = points - centre
-        offset = offset - ((offset @ normal) / tilt)[..., None] * tangent
-        return 1000 * np.stack([offset @ right, offset @ up], axis=-1)
-
+    element, chainage = result.element(element_id), float(profile.chainage[0])
+    xyz = cuts.points_of_profile(cloud, result, element_id, key)
     siblings = cuts.profiles_of(result, element_id)
     siblings = siblings[siblings.stack_id == key.stack_id]
-    xyz = cuts.points_of_profile(cloud, result, element_id, key)
-
-    major = profile.major_direction[0]
-    fitted = Ellipse(
-        (0.0, 0.0),
-        1000 * float(profile.semi_major[0]),
-        1000 * float(profile.semi_minor[0]),
-        float(np.arctan2(major @ up, major @ right)),
-    )
-    radius_mm = 1000 * float(element.radius_at(chainage))
-    axis_u, axis_v = in_plane(element.axis.at(chainage))
-    reference = Ellipse(
-        (float(axis_u), float(axis_v)),
-        radius_mm / tilt,
-        radius_mm,
-        float(np.arctan2(tangent @ up, tangent @ right)),
-    )
     return SectionState(
         element=element,
         profile=profile,
-        points_uv=in_plane(xyz),
-        fitted=fitted,
-        reference=reference,
+        cut=cut_section(element, profile, xyz),
         position=1 + int(np.flatnonzero(siblings.profile_index == key.profile_index)[0]),
         count=len(siblings),
         stack_name=cuts.stack_name(result, key.stack_id),

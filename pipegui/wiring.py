@@ -79,9 +79,15 @@ def connect_views(window: "MainWindow") -> None:
         lambda stack, index: do(commands.select_profile, stack, index)
     )
     parts.radius_plot.stack_chosen.connect(lambda i: do(commands.show_plot_stack, i))
+    parts.radius_plot.pin_toggled.connect(lambda: do(commands.toggle_pin))
+    parts.radius_plot.pins_cleared.connect(lambda: do(commands.set_view, pinned_elements=()))
     parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
     parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
     parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
+    for plot in (parts.radius_plot, parts.section, parts.map):
+        plot.save_requested.connect(
+            lambda ending, plot=plot: window.menu_actions.save_plot(plot, ending)
+        )
 
 
 def connect_jobs(window: "MainWindow") -> None:

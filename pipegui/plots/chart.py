@@ -3,12 +3,24 @@
 from collections.abc import Callable
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, Qt
-from PySide6.QtGui import QColor, QFont
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QStackedLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QAction, QColor, QCursor, QFont, QGuiApplication, QKeySequence
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QMenu,
+    QStackedLayout,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
 from pipegui import theme
+from pipegui.plots.export import Table, png, to_csv, to_image, to_svg, to_tsv
 from pipegui.theme import SPACING
+
+SAVED_AS = {"png": "Save as PNG…", "svg": "Save as SVG…", "csv": "Save numbers as CSV…"}
+"""Endings of the files that every plot can be saved as."""
 
 
 class Chart(QWidget):
@@ -20,12 +32,18 @@ class Chart(QWidget):
         What would fill the plot; shown while there is nothing in it.
     """
 
+    save_requested = Signal(str)
+    """The ending of the file that the plot is to be saved as, see `SAVED_AS`."""
+
     def __init__(self, empty_text: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._dark: bool | None = None
+        self._icons: dict[QToolButton, str] = {}
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.header = QHBoxLayout()
         self.header.setSpacing(SPACING)
         self.canvas = pg.GraphicsLayoutWidget()
+        self.canvas.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.canvas.ci.setContentsMargins(0, SPACING, SPACING, 0)
         self.canvas.ci.setSpacing(SPACING // 2)
         self.readout = QLabel()
@@ -44,6 +62,20 @@ class Chart(QWidget):
         self._stack = QStackedLayout(self)
         self._stack.addWidget(self.empty)
         self._stack.addWidget(filled)
+        self.menu = self._make_menu()
+        self.menu_button = self.tool_button("Copy and save", "export-variant")
+        self.menu_button.setMenu(self.menu)
+        self.menu_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.canvas.scene().sigMouseClicked.connect(self._open_menu)
+
+    def tool_button(self, tip: str, icon: str) -> QToolButton:
+        """Return a small button for the header; its icon follows the theme."""
+        button = QToolButton()
+        button.setAutoRaise(True)
+        button.setToolTip(tip)
+        button.setAccessibleName(tip)
+        self._icons[button] = icon
+        return button
 
     def add_plot(self, row: int, left: str, bottom: str = "") -> pg.PlotItem:
         """Add a plot with its axes' labels; it zooms but has no menu."""
@@ -66,6 +98,8 @@ class Chart(QWidget):
         muted = theme.colour("muted").name()
         self.empty.setStyleSheet(f"color: {muted}")
         self.readout.setStyleSheet(f"color: {muted}")
+        for button, icon in self._icons.items():
+            button.setIcon(theme.icon(icon))
         grid = 40 if self._dark else 30
         for plot in self.plots():
             plot.showGrid(x=True, y=True, alpha=grid / 255)
@@ -83,6 +117,63 @@ class Chart(QWidget):
     def show_filled(self, filled: bool) -> None:
         """Show the plots, or the word that says what would fill them."""
         self._stack.setCurrentIndex(int(filled))
+
+    # Copying and saving
+
+    def numbers(self) -> Table:
+        """What is plotted, as plain numbers."""
+        raise NotImplementedError
+
+    def heading(self) -> str:
+        """What stands above the plot in a picture, as rich text."""
+        return ""
+
+    def fit(self) -> None:
+        """Show all that is plotted."""
+
+    def _make_menu(self) -> QMenu:
+        menu = QMenu(self)
+        menu.addAction("Show all", self.fit)
+        menu.addSeparator()
+        for text, shortcut, act in (
+            ("Copy numbers", QKeySequence(QKeySequence.StandardKey.Copy), self.copy_numbers),
+            ("Copy picture", QKeySequence("Ctrl+Shift+C"), self.copy_picture),
+        ):
+            action = QAction(text, self)
+            action.setShortcut(shortcut)
+            action.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            action.triggered.connect(act)
+            self.addAction(action)  # the keys work while the plot has the focus
+            menu.addAction(action)
+        menu.addSeparator()
+        for ending, text in SAVED_AS.items():
+            menu.addAction(text, lambda ending=ending: self.save_requested.emit(ending))
+        return menu
+
+    def _open_menu(self, event: object) -> None:
+        self.setFocus()
+        if event.button() == Qt.MouseButton.RightButton:
+            self.menu.popup(QCursor.pos())
+
+    def copy_numbers(self) -> None:
+        """Copy what is plotted, for a spreadsheet."""
+        QGuiApplication.clipboard().setText(to_tsv(self.numbers()))
+
+    def copy_picture(self) -> None:
+        """Copy the plot as it looks."""
+        QGuiApplication.clipboard().setImage(to_image(self.canvas, self.heading()))
+
+    def as_file(self, ending: str) -> bytes:
+        """Return the plot as the content of a file, see `SAVED_AS`."""
+        match ending:
+            case "csv":
+                return to_csv(self.numbers()).encode()
+            case "svg":
+                return to_svg(self.canvas, self.heading())
+            case _:
+                return png(to_image(self.canvas, self.heading()))
+
+    # Mouse
 
     def on_click(self, act: Callable[[pg.PlotItem, QPointF], None]) -> None:
         """Call `act` with plot and position in the canvas when a plot is clicked."""

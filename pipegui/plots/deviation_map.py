@@ -13,6 +13,7 @@ from pipegui import theme
 from pipegui.colour_maps import DEVIATION, deviation_colours
 from pipegui.colours import VERDICT
 from pipegui.plots.chart import Chart
+from pipegui.plots.export import Table
 from pipegui.plots.unrolled import Unrolled, from_clock, unroll
 from pipegui.theme import SPACING
 from pipegui.view_state import MapState
@@ -39,6 +40,7 @@ class DeviationMap(Chart):
         self.scale = ScaleStrip()
         self.header.addWidget(self.scale)
         self.header.addStretch(1)
+        self.header.addWidget(self.menu_button)
         self.plot = self.add_plot(0, "Clock", "Chainage, m")
         self.plot.getAxis("left").setTicks([DEGREES])
         self.plot.setYRange(-MARGIN_DEG, MARGIN_DEG, padding=0)
@@ -73,7 +75,7 @@ class DeviationMap(Chart):
         self._draw_image()
         self._draw_shapes()
         if is_other:
-            self.plot.setXRange(self._map.start, self._map.start + self._map.length, padding=0.02)
+            self.fit()
 
     # Drawing
 
@@ -124,6 +126,41 @@ class DeviationMap(Chart):
         radius = float(self._state.element.radius_at(deformation.chainage))
         width = deformation.width / radius if radius > 0 else np.nan
         return width if np.isfinite(width) else 2 * np.pi
+
+    def fit(self) -> None:
+        """Show the whole element."""
+        if self._map is not None:
+            self.plot.setXRange(self._map.start, self._map.start + self._map.length, padding=0.02)
+            self.plot.setYRange(-MARGIN_DEG, MARGIN_DEG, padding=0)
+
+    # Copying
+
+    def heading(self) -> str:
+        """What is unrolled, and what the colours mean."""
+        element, limit = self._state.element, self._state.limit_mm
+        name = "" if element is None else element.label
+        blue, red = (QColor(*DEVIATION[i].tolist()).name() for i in (0, -1))
+        inward, outward = (f'<span style="color:{c}">■</span>' for c in (blue, red))
+        return (
+            f"<b>{name}</b> · deviation<br>{inward} {limit:g} mm inward … "
+            f"{outward} {limit:g} mm outward"
+        )
+
+    def numbers(self) -> Table:
+        """The cells that hold points."""
+        if self._map is None:
+            return {}
+        deviation, counts = self._map.deviation_mm, self._map.n_points
+        along, around = np.nonzero(counts)
+        chainage = self._map.start + (along + 0.5) * self._map.length / deviation.shape[0]
+        clock = np.mod((around + 0.5) * 2 * np.pi / deviation.shape[1] - np.pi, 2 * np.pi)
+        return {
+            "chainage_m": [f"{v:.4f}" for v in chainage],
+            "clock": [format_clock(float(v)) for v in clock],
+            "clock_deg": [f"{v:.2f}" for v in np.rad2deg(clock)],
+            "deviation_mm": [f"{v:.3f}" for v in deviation[along, around]],
+            "n_points": [str(v) for v in counts[along, around]],
+        }
 
     # Mouse
 

@@ -1,69 +1,135 @@
-"""Radius against profile index of the selected element, as the paper draws it."""
+"""Radius against profile of the selected element, as the paper draws it, and of pinned ones."""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QColor, QFontMetrics
-from PySide6.QtWidgets import QComboBox, QLabel, QWidget
+from PySide6.QtGui import QAction, QColor, QFontMetrics
+from PySide6.QtWidgets import (
+    QComboBox,
+    QGraphicsSimpleTextItem,
+    QLabel,
+    QMenu,
+    QToolButton,
+    QWidget,
+)
 
 from pipecore.geometry import Array
-from pipecore.report.format import format_measure
+from pipecore.report.format import cell, format_measure
+from pipecore.types import Element, Profiles
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.colours import VERDICT
+from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, faint, small
+from pipegui.plots.export import Table
 from pipegui.plots.pattern import Pattern, index_at, pattern_of
 from pipegui.view_state import RadiusPlotState
 
 EMPTY = "Select an element to see its radius from profile to profile."
 CLICK_PX = 20
-POINT_PX = 6
+SPACE = 4
+"""Pixels between the plots."""
 X_AXES = {"Index": "Profile index", "Chainage": "Chainage, m"}
+SERIES = {
+    "semi_minor": "Semi-minor axis",
+    "free_radius": "Radius of the free circle",
+    "fitted": "Fitted pattern",
+    "band": "Scatter band",
+    "limit": "Limit of the rule",
+    "error_bars": "Error bars",
+    "centre": "Centre off the axis",
+    "ovality": "Ovality",
+    "difference": "As difference from the fitted radius",
+}
+"""What can be shown, by name."""
+AT_FIRST = frozenset(SERIES) - {"free_radius", "difference"}
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One element's profiles as they are plotted."""
+
+    element: Element
+    profiles: Profiles
+    pattern: Pattern
+    x: Array
+    colour: QColor
 
 
 class RadiusPlot(Chart):
-    """Semi-minor axis per profile with the fitted pattern; centre deviation below it."""
+    """Semi-minor axis per profile with the fitted pattern; centre and ovality below it."""
 
     profile_clicked = Signal(int, int)
     """Stack id and profile index."""
     stack_chosen = Signal(int)
+    pin_toggled = Signal()
+    """The present element is to stay in the plot, or is not to any more."""
+    pins_cleared = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(EMPTY, parent)
         self._state = RadiusPlotState()
-        self._x: Array = np.empty(0)
-        self._pattern: Pattern | None = None
-        self.stacks = QComboBox()
-        self.stacks.setMinimumContentsLength(14)
-        self.stacks.setToolTip("The stack whose profiles are plotted.")
-        self.stacks.activated.connect(self._choose_stack)
-        self.x_axis = QComboBox()
-        self.x_axis.addItems(X_AXES)
-        self.x_axis.setToolTip("What the profiles are plotted against.")
-        self.x_axis.currentIndexChanged.connect(self._draw)
-        self.key = QLabel()
-        self.header.addWidget(self.stacks)
-        self.header.addWidget(self.x_axis)
-        self.header.addStretch(1)
-        self.layout_key()
+        self._curve: Curve | None = None
+        self._pinned: list[Curve] = []
+        self._make_header()
         self.radius = self.add_plot(0, "mm")
-        self.offset = self.add_plot(1, "mm", X_AXES["Index"])
-        # Inside the plot: beside its axis there is no room for it in a small panel.
-        self.offset_title = pg.LabelItem("centre off the axis")
-        self.offset_title.setParentItem(self.offset.vb)
-        self.offset_title.anchor((0, 0), (0, 0), offset=(4, -2))
-        self.offset.setXLink(self.radius)
-        self.canvas.ci.layout.setRowStretchFactor(0, 5)
-        self.canvas.ci.layout.setRowStretchFactor(1, 2)
-        self.radius.getAxis("bottom").setStyle(showValues=False)
+        self.offset = self.add_plot(1, "mm")
+        self.ovality = self.add_plot(2, "%")
+        self._titles = [
+            self._inside_title(plot, text)
+            for plot, text in ((self.offset, "centre off the axis"), (self.ovality, "ovality"))
+        ]
+        for plot in (self.offset, self.ovality):
+            plot.setXLink(self.radius)
         self.on_click(self._click)
         self.on_hover(self._hover)
         self.setAccessibleName("Radius plot")
 
-    def layout_key(self) -> None:
-        """Put the key between header and plots."""
-        column = self.canvas.parentWidget().layout()
-        column.insertWidget(1, self.key)
+    def _make_header(self) -> None:
+        self.stacks = QComboBox()
+        self.stacks.setMinimumContentsLength(10)
+        self.stacks.setAccessibleName("Stack")
+        self.stacks.setToolTip("The stack whose profiles are plotted")
+        self.stacks.activated.connect(self._choose_stack)
+        self.x_axis = QComboBox()
+        self.x_axis.addItems(X_AXES)
+        self.x_axis.setAccessibleName("Plot against")
+        self.x_axis.setToolTip("What the profiles are plotted against")
+        self.x_axis.currentIndexChanged.connect(self._change_axis)
+        self.pin = self.tool_button("Pin: keep this element in the plot", "pin-outline")
+        self.pin.setCheckable(True)
+        self.pin.clicked.connect(lambda _: self.pin_toggled.emit())
+        self.shown_menu = QMenu(self)
+        self.shown: dict[str, QAction] = {}
+        for name, text in SERIES.items():
+            if name in ("centre", "difference"):
+                self.shown_menu.addSeparator()
+            action = self.shown[name] = self.shown_menu.addAction(text)
+            action.setCheckable(True)
+            action.setChecked(name in AT_FIRST)
+            action.toggled.connect(self._change_shown)
+        self.shown_menu.addSeparator()
+        self.shown_menu.addAction("Take all pins off", self.pins_cleared.emit)
+        self.shown_button = self.tool_button("What is plotted", "tune-variant")
+        self.shown_button.setMenu(self.shown_menu)
+        self.shown_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        self.key = QLabel(wordWrap=True)
+        self.key.setMinimumWidth(1)
+        for widget in (self.stacks, self.x_axis):
+            self.header.addWidget(widget)
+        self.header.addStretch(1)
+        for widget in (self.pin, self.shown_button, self.menu_button):
+            self.header.addWidget(widget)
+        self.canvas.parentWidget().layout().insertWidget(1, self.key)
+
+    def _inside_title(self, plot: pg.PlotItem, text: str) -> QGraphicsSimpleTextItem:
+        """A title inside the plot: beside its axis there is no room in a small panel."""
+        title = QGraphicsSimpleTextItem(text, plot.vb)
+        title.setFont(small(self.font()))
+        title.setPos(SPACE, 0)
+        return title
 
     def apply(self, state: RadiusPlotState) -> None:
         """Show `state`."""
@@ -79,10 +145,11 @@ class RadiusPlot(Chart):
         )
         self.show_filled(has_profiles)
         self._fill_stacks(state)
+        self.pin.setChecked(state.is_pinned)
         self._draw()
         is_other = state.element is not before.element or state.stack_id != before.stack_id
-        if has_profiles and is_other:
-            self._fit()
+        if has_profiles and (is_other or state.pinned != before.pinned):
+            self.fit()
 
     def _fill_stacks(self, state: RadiusPlotState) -> None:
         with QSignalBlocker(self.stacks):
@@ -94,157 +161,249 @@ class RadiusPlot(Chart):
     def _choose_stack(self, row: int) -> None:
         self.stack_chosen.emit(self.stacks.itemData(row))
 
-    # Drawing
+    def _change_axis(self) -> None:
+        self._draw()
+        self.fit()
+
+    def _change_shown(self) -> None:
+        self._draw()
+        self.fit()
+
+    # Numbers
+
+    def shows(self, name: str) -> bool:
+        """Whether one of `SERIES` is shown."""
+        return self.shown[name].isChecked()
 
     @property
     def _is_by_chainage(self) -> bool:
         return self.x_axis.currentIndex() == 1
 
-    def _x_at(self, chainage: Array | float) -> Array:
+    def _x_at(self, chainage: Array | float, profiles: Profiles) -> Array:
         if self._is_by_chainage:
-            return np.asarray(chainage)
-        return index_at(chainage, self._state.shown)
+            return np.asarray(chainage, np.float64)
+        return np.asarray(index_at(chainage, profiles), np.float64)
+
+    def _curve_of(self, element: Element, profiles: Profiles, number: int) -> Curve:
+        x = self._x_at(profiles.chainage, profiles)
+        colour = QColor(*QUALITATIVE[number % len(QUALITATIVE)].tolist())
+        return Curve(element, profiles, pattern_of(element, profiles), x, colour)
+
+    def _level(self, curve: Curve, values: Array) -> Array:
+        """Values of a curve as plotted: as they are, or less the fitted radius."""
+        return values - curve.pattern.fitted if self.shows("difference") else values
+
+    # Drawing
 
     def _draw(self) -> None:
-        state = self._state
+        state, profiles = self._state, self._state.shown
         self.readout.clear()
-        self.radius.clear()
-        self.offset.clear()
-        self.offset.setLabel("bottom", X_AXES[self.x_axis.currentText()])
-        self.offset_title.setText("centre off the axis", color=theme.colour("muted"), size="8pt")
-        profiles = state.shown
+        for plot in self.plots():
+            plot.clear()
+        self._curve, self._pinned = None, []
         if state.element is None or not len(profiles):
-            self._pattern, self._x = None, np.empty(0)
             return
-        self._pattern = pattern = pattern_of(state.element, profiles)
-        self._x = self._x_at(profiles.chainage).astype(np.float64)
-        data, fitted = QColor(*QUALITATIVE[0].tolist()), theme.colour("text")
-        self._shade_deformations()
-        self._draw_band(pattern, data)
-        order = np.argsort(self._x, kind="stable")
-        x = self._x[order]
-        self.radius.plot(x, pattern.fitted[order], pen=pg.mkPen(fitted, width=1.5), antialias=True)
-        self._draw_points(self.radius, pattern.values, data, pattern.sd)
-        self._draw_points(self.offset, 1000 * profiles.centre_deviation, data)
-        self._mark_selected()
-        self._describe(pattern, data, fitted)
-
-    def _draw_band(self, pattern: Pattern, colour: QColor) -> None:
-        order = np.argsort(self._x, kind="stable")
-        x, moved = self._x[order], pattern.moved[order]
-        edges = [
-            pg.PlotDataItem(x, moved + side * pattern.spread, pen=pg.mkPen(None))
-            for side in (-1, 1)
+        self._curve = curve = self._curve_of(state.element, profiles, 0)
+        self._pinned = [
+            self._curve_of(pinned.element, pinned.profiles, number)
+            for number, pinned in enumerate(state.pinned, start=1)
         ]
-        for edge in edges:
-            self.radius.addItem(edge)
-        self.radius.addItem(pg.FillBetweenItem(*edges, brush=faint(colour, 0.16)))
-        dashed = pg.mkPen(colour, width=1.5, style=Qt.PenStyle.DashLine)
-        self.radius.plot(x, moved, pen=dashed, antialias=True)
-
-    def _draw_points(
-        self, plot: pg.PlotItem, values: Array, colour: QColor, sd: Array | None = None
-    ) -> None:
-        shown = np.isfinite(values)
-        x, y = self._x[shown], values[shown]
-        if sd is not None:
-            height = 2 * np.nan_to_num(sd[shown])
-            bars = pg.ErrorBarItem(x=x, y=y, height=height, pen=pg.mkPen(faint(colour, 0.5)))
-            plot.addItem(bars)
-        plot.addItem(
-            pg.ScatterPlotItem(
-                x, y, size=POINT_PX, brush=colour, pen=pg.mkPen(None), antialias=True
+        self._arrange()
+        self._shade_deformations(curve)
+        if self.shows("band"):
+            drawing.draw_band(
+                self.radius,
+                curve.x,
+                self._level(curve, curve.pattern.moved),
+                curve.pattern.spread,
+                curve.colour,
             )
-        )
+            moved = self._level(curve, curve.pattern.moved)
+            drawing.draw_line(self.radius, curve.x, moved, curve.colour, dashed=True)
+        if self.shows("limit") and state.dent_limit is not None:
+            lowest = curve.pattern.fitted - 1000 * state.dent_limit.depth
+            red = QColor(VERDICT["reject"])
+            drawing.draw_line(self.radius, curve.x, self._level(curve, lowest), red, dashed=True)
+        for one in (*self._pinned, curve):
+            self._draw_curve(one, is_pinned=one is not curve)
+        self._mark_selected(curve)
+        self._describe(curve)
 
-    def _shade_deformations(self) -> None:
+    def _arrange(self) -> None:
+        """Show the plots that are wanted; the lowest has the axis's numbers and name."""
+        assert self._curve is not None
+        every = (self._curve, *self._pinned)
+        has_ovality = any(np.isfinite(c.profiles.ovality).any() for c in every)
+        wanted = {
+            self.radius: True,
+            self.offset: self.shows("centre"),
+            self.ovality: self.shows("ovality") and has_ovality,
+        }
+        layout = self.canvas.ci.layout
+        for row, (plot, is_wanted) in enumerate(wanted.items()):
+            plot.setVisible(is_wanted)
+            plot.setMaximumHeight(16_777_215 if is_wanted else 0)
+            layout.setRowStretchFactor(row, (5 if row == 0 else 2) if is_wanted else 0)
+            layout.setRowSpacing(row, SPACE if is_wanted else 0)
+        lowest = [plot for plot, is_wanted in wanted.items() if is_wanted][-1]
+        for plot in wanted:
+            axis = plot.getAxis("bottom")
+            axis.setStyle(showValues=plot is lowest)
+            axis.setLabel(X_AXES[self.x_axis.currentText()] if plot is lowest else None)
+            axis.showLabel(plot is lowest)
+        for title in self._titles:
+            title.setBrush(theme.colour("muted"))
+
+    def _draw_curve(self, curve: Curve, *, is_pinned: bool) -> None:
+        profiles, pattern, bars = curve.profiles, curve.pattern, self.shows("error_bars")
+        size = drawing.POINT_PX - (1.5 if is_pinned else 0)
+        if self.shows("fitted"):
+            colour = curve.colour if is_pinned else theme.colour("text")
+            fitted = self._level(curve, pattern.fitted)
+            drawing.draw_line(self.radius, curve.x, fitted, colour)
+        if self.shows("free_radius") and not is_pinned:
+            free, sd = 1000 * profiles.radius, 1000 * profiles.radius_sd
+            violet = QColor(*QUALITATIVE[-1].tolist())
+            level = self._level(curve, free)
+            drawing.draw_points(self.radius, curve.x, level, violet, sd if bars else None, "d", 7)
+        if self.shows("semi_minor"):
+            level, sd = self._level(curve, pattern.values), pattern.sd if bars else None
+            drawing.draw_points(self.radius, curve.x, level, curve.colour, sd, size=size)
+        for plot, values in (
+            (self.offset, 1000 * profiles.centre_deviation),
+            (self.ovality, 100 * profiles.ovality),
+        ):
+            drawing.draw_points(plot, curve.x, values, curve.colour, size=size)
+
+    def _shade_deformations(self, curve: Curve) -> None:
         for deformation in self._state.deformations:
             is_selected = deformation.deformation_id == self._state.selected_deformation
             colour = theme.colour("accent") if is_selected else QColor(VERDICT[deformation.verdict])
-            ends = self._x_at(np.array([deformation.chainage_start, deformation.chainage_end]))
-            for plot in (self.radius, self.offset):
-                region = pg.LinearRegionItem(
-                    np.sort(ends),
-                    movable=False,
-                    brush=faint(colour, 0.18 if is_selected else 0.12),
-                    pen=pg.mkPen(faint(colour, 0.6)),
-                )
-                region.setZValue(-10)
-                plot.addItem(region)
+            ends = np.array([deformation.chainage_start, deformation.chainage_end])
+            ends = self._x_at(ends, curve.profiles)
+            for plot in self.plots():
+                drawing.draw_stretch(plot, ends, colour, is_selected=is_selected)
             text = f"{deformation.kind} {format_measure(1000 * deformation.depth, unit='mm')}"
-            label = pg.InfLineLabel(
-                pg.InfiniteLine(float(ends.mean()), pen=pg.mkPen(None)),
-                text,
-                position=0.93,
-                anchors=[(0.5, 0.5), (0.5, 0.5)],
-                color=colour,
-            )
-            label.setFont(small(self.font()))
-            self.radius.addItem(label.line)
+            font = small(self.font())
+            drawing.draw_label(self.radius, float(ends.mean()), text, colour, font)
 
-    def _mark_selected(self) -> None:
-        profiles, index = self._state.shown, self._state.selected_index
-        rows = np.flatnonzero(profiles.profile_index == index) if index is not None else []
-        if not len(rows) or self._pattern is None:
+    def _mark_selected(self, curve: Curve) -> None:
+        index = self._state.selected_index
+        rows = np.flatnonzero(curve.profiles.profile_index == index) if index is not None else []
+        if not len(rows):
             return
-        row, accent = rows[0], theme.colour("accent")
-        for plot, values in (
-            (self.radius, self._pattern.values),
-            (self.offset, 1000 * profiles.centre_deviation),
-        ):
-            plot.addItem(pg.InfiniteLine(self._x[row], pen=pg.mkPen(accent, width=1)))
-            if np.isfinite(values[row]):
-                plot.addItem(
-                    pg.ScatterPlotItem(
-                        [self._x[row]],
-                        [values[row]],
-                        size=2 * POINT_PX,
-                        brush=accent,
-                        pen=pg.mkPen(theme.colour("base"), width=1.5),
-                        antialias=True,
-                    )
-                )
+        for plot in self.plots():
+            drawing.draw_mark(plot, curve.x[rows[0]], float(self._values(plot, curve)[rows[0]]))
 
-    def _describe(self, pattern: Pattern, data: QColor, fitted: QColor) -> None:
+    def _values(self, plot: pg.PlotItem, curve: Curve) -> Array:
+        """The points that a plot shows of a curve."""
+        if plot is self.radius:
+            return self._level(curve, curve.pattern.values)
+        if plot is self.offset:
+            return 1000 * curve.profiles.centre_deviation
+        return 100 * curve.profiles.ovality
+
+    def _describe(self, curve: Curve) -> None:
+        pattern, data = curve.pattern, curve.colour
         scatter = f"scatter ± {format_measure(pattern.spread, unit='mm', decimals=2)}"
         if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
             scatter = f"median {format_measure(pattern.middle, decimals=2)}, {scatter}"
-        dot, line, dash, band = (
-            f'<span style="color:{c.name()}">{s}</span>'
-            for c, s in ((data, "●"), (fitted, "━"), (data, "╍"), (faint(data, 1), "▒"))
-        )
-        self.key.setText(f"{dot} semi-minor axis&nbsp; {line} fitted&nbsp; {dash} {band} {scatter}")
+        parts = []
+        if self.shows("semi_minor"):
+            name = "semi-minor axis" if not self._pinned else curve.element.label
+            parts.append(_key("●", data, name))
+        parts += [_key("●", c.colour, c.element.label) for c in self._pinned]
+        if self.shows("free_radius"):
+            violet = QColor(*QUALITATIVE[-1].tolist())
+            parts.append(_key("◇", violet, "free circle"))
+        if self.shows("fitted"):
+            parts.append(_key("━", theme.colour("text"), "fitted"))
+        if self.shows("band"):
+            parts.append(_key("╍", data, "") + _key("▒", faint(data, 1), scatter))
+        limit = self._state.dent_limit
+        if self.shows("limit") and limit is not None:
+            text = f"limit for dents {1000 * limit.depth:.1f} mm"
+            parts.append(_key("╍", QColor(VERDICT["reject"]), text))
+            self.key.setToolTip(limit.text)
+        self.key.setText("&nbsp; ".join(parts))
 
-    def _fit(self) -> None:
+    def fit(self) -> None:
         """Show all points with a margin; a few wild ones must not flatten the rest."""
-        pattern = self._pattern
-        if pattern is None or not len(self._x):
+        curve = self._curve
+        if curve is None:
             return
-        values = pattern.values[np.isfinite(pattern.values)]
-        if not len(values):
+        lows, highs = [], []
+        for one in (curve, *self._pinned):
+            values = self._level(one, one.pattern.values)
+            values = values[np.isfinite(values)]
+            if not len(values):
+                continue
+            fitted = self._level(one, one.pattern.fitted)
+            low, high = np.percentile(values, [2, 98])
+            low, high = min(low, fitted.min()), max(high, fitted.max())
+            room = max(0.6 * (high - low), 4 * one.pattern.spread, 0.5)
+            lows.append(max(values.min(), low - room))
+            highs.append(min(values.max(), high + room))
+        if not lows:
             return
-        low, high = np.percentile(values, [2, 98])
-        low, high = min(low, pattern.fitted.min()), max(high, pattern.fitted.max())
-        room = max(0.6 * (high - low), 4 * pattern.spread, 0.5)
-        low, high = max(values.min(), low - room), min(values.max(), high + room)
-        margin = max(0.15 * (high - low), 0.5)
-        self.radius.setYRange(low - margin, high + 2 * margin, padding=0)
-        self.radius.setXRange(self._x.min(), self._x.max(), padding=0.03)
-        off = 1000 * self._state.shown.centre_deviation
-        top = float(np.nanmax(off)) if np.isfinite(off).any() else 1.0
-        self.offset.setYRange(0, 1.15 * max(top, 0.5), padding=0)
+        if self.shows("limit") and self._state.dent_limit is not None:
+            limit = self._level(curve, curve.pattern.fitted).min()
+            limit -= 1000 * self._state.dent_limit.depth
+            if limit > min(lows) - (max(highs) - min(lows)):  # else it would flatten the rest
+                lows.append(limit)
+        margin = max(0.15 * (max(highs) - min(lows)), 0.5)
+        self.radius.setYRange(min(lows) - margin, max(highs) + 2 * margin, padding=0)
+        every = np.concatenate([c.x for c in (curve, *self._pinned)])
+        self.radius.setXRange(every.min(), every.max(), padding=0.03)
+        for plot in (self.offset, self.ovality):
+            values = np.concatenate([self._values(plot, c) for c in (curve, *self._pinned)])
+            top = float(np.nanmax(values)) if np.isfinite(values).any() else 1.0
+            plot.setYRange(0, 1.15 * max(top, 0.5), padding=0)
+
+    # Copying
+
+    def heading(self) -> str:
+        """Title and key of the picture."""
+        element = self._state.element
+        name = "" if element is None else element.label
+        return f"<b>{name}</b> · {self.stacks.currentText()}<br>{self.key.text()}"
+
+    def numbers(self) -> Table:
+        """The profiles of the element and of the pinned ones."""
+        table: dict[str, list[str]] = {}
+
+        def put(title: str, cells: list[str]) -> None:
+            table.setdefault(title, []).extend(cells)
+
+        def put_numbers(title: str, values: Array, decimals: int) -> None:
+            put(title, [cell(float(v), decimals) for v in values])
+
+        for curve in (self._curve, *self._pinned) if self._curve else ():
+            rows, pattern = curve.profiles, curve.pattern
+            put("element", [curve.element.label] * len(rows))
+            put("profile_index", [str(i) for i in rows.profile_index])
+            put_numbers("chainage_m", rows.chainage, 4)
+            put_numbers("semi_minor_mm", pattern.values, 3)
+            put_numbers("semi_minor_sd_mm", pattern.sd, 3)
+            put_numbers("radius_mm", 1000 * rows.radius, 3)
+            put_numbers("radius_sd_mm", 1000 * rows.radius_sd, 3)
+            put_numbers("fitted_mm", pattern.fitted, 3)
+            put_numbers("centre_deviation_mm", 1000 * rows.centre_deviation, 3)
+            put_numbers("ovality_pct", 100 * rows.ovality, 3)
+            put_numbers("arc_deg", np.rad2deg(rows.arc), 1)
+        return table
 
     # Mouse
 
     def _row_at(self, plot: pg.PlotItem, position: QPointF) -> int | None:
         """Row of the profile whose point is nearest to `position`, if any is near."""
-        if self._pattern is None:
+        curve = self._curve
+        if curve is None:
             return None
-        is_radius = plot is self.radius
-        values = self._pattern.values if is_radius else 1000 * self._state.shown.centre_deviation
+        values = self._values(plot, curve)
         pixel = plot.vb.viewPixelSize()
         cursor = plot.vb.mapSceneToView(position)
-        away = np.hypot((self._x - cursor.x()) / pixel[0], (values - cursor.y()) / pixel[1])
+        away = np.hypot((curve.x - cursor.x()) / pixel[0], (values - cursor.y()) / pixel[1])
         if not np.isfinite(away).any() or np.nanmin(away) > CLICK_PX:
             return None
         return int(np.nanargmin(away))
@@ -269,3 +428,9 @@ class RadiusPlot(Chart):
         )
         metrics = QFontMetrics(self.readout.font())
         return metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.readout.width())
+
+
+def _key(sign: str, colour: QColor, text: str) -> str:
+    """Part of the key: a sign in its colour and what it stands for."""
+    coloured = f'<span style="color:{colour.name()}">{sign}</span>'
+    return f"{coloured}&nbsp;{text.replace(' ', '&nbsp;')}" if text else coloured

@@ -1,17 +1,20 @@
-"""One profile: its points, its ellipse and the undeformed contour, in millimetres."""
+"""One profile: its points, its ellipse and curve, the undeformed contour, in millimetres."""
 
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent
-from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
+from PySide6.QtGui import QAction, QColor, QKeyEvent
+from PySide6.QtWidgets import QLabel, QMenu, QSlider, QToolButton, QWidget
 
-from pipecore.report.format import NOT_MEASURABLE, format_measure
-from pipecore.types import Profiles
+from pipecore.geometry import Array
+from pipecore.report.format import cell, format_measure
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.plots.chart import Chart, faint
+from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensions_text
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
+from pipegui.plots.export import Table
+from pipegui.section_cut import Ellipse, SectionCut
 from pipegui.view_state import SectionState
 
 EMPTY = "Select a profile to see its section: click a point of the radius plot or of the map."
@@ -19,109 +22,152 @@ MAX_FACTOR = 20
 MAX_POINTS = 20_000
 HOVER_PX = 15
 CLOCK = (("12", 0, 1), ("3", 1, 0), ("6", 0, -1), ("9", -1, 0))
+HOURS = tuple((90.0 * i, text) for i, text in enumerate(("12:00", "3:00", "6:00", "9:00", "12:00")))
 STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Down: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_Up: 1}
+FAR = {Qt.Key.Key_PageDown: -10, Qt.Key.Key_PageUp: 10, Qt.Key.Key_Home: -(10**6)}
+FAR |= {Qt.Key.Key_End: 10**6}
+LAYERS = {
+    "points": "Points",
+    "curve": "Fitted curve",
+    "ellipse": "Ellipse",
+    "reference": "Undeformed contour",
+    "nominal": "Nominal size",
+    "dimensions": "Dimensions",
+    "curvature": "Curvature",
+}
+AT_FIRST = frozenset(LAYERS) - {"nominal"}
 
 
 class SectionView(Chart):
     """The section of the selected profile; arrow keys step to its neighbours."""
 
     step_requested = Signal(int)
-    """How many profiles further: -1 or 1."""
+    """How many profiles further: -1 or 1, or many."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(EMPTY, parent)
         self._state = SectionState()
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._make_header()
+        self.plot = self.add_plot(0, "mm")
+        self.plot.setAspectLocked(True)
+        self.curvature = self.add_plot(1, "κ · r")
+        self.curvature.getAxis("bottom").setTicks([HOURS])
+        self.curvature.setLimits(xMin=-20, xMax=380)
+        self.canvas.ci.layout.setRowStretchFactor(0, 3)
+        self.canvas.ci.layout.setRowStretchFactor(1, 1)
+        self.dimensions = QLabel(wordWrap=True)
+        self.dimensions.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.canvas.parentWidget().layout().insertWidget(2, self.dimensions)
+        self.on_hover(self._hover)
+        self.setAccessibleName("Section")
+
+    def _make_header(self) -> None:
         self.title = QLabel()
-        self.back, self.ahead = QToolButton(), QToolButton()
-        for button, step, tip in (
-            (self.back, -1, "Previous profile (←)"),
-            (self.ahead, 1, "Next profile (→)"),
-        ):
-            button.setAutoRaise(True)
-            button.setToolTip(tip)
+        self.back = self.tool_button("Previous profile (←)", "chevron-left")
+        self.ahead = self.tool_button("Next profile (→)", "chevron-right")
+        for button, step in ((self.back, -1), (self.ahead, 1)):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.clicked.connect(lambda _=False, step=step: self.step_requested.emit(step))
         self.factor = QSlider(Qt.Orientation.Horizontal, minimum=1, maximum=MAX_FACTOR)
-        self.factor.setMaximumWidth(120)
-        self.factor.setToolTip("Draws deviations from the undeformed contour larger.")
+        self.factor.setMaximumWidth(96)
+        self.factor.setAccessibleName("Exaggeration")
+        self.factor.setToolTip("Draws deviations from the undeformed contour larger")
         self.factor.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.factor.valueChanged.connect(self._exaggerate)
+        self.factor.valueChanged.connect(self._redraw)
         self.factor_text = QLabel("1×")
         self.factor_text.setMinimumWidth(self.fontMetrics().horizontalAdvance("20×"))
+        self.layer_menu = QMenu(self)
+        self.layers: dict[str, QAction] = {}
+        for name, text in LAYERS.items():
+            action = self.layers[name] = self.layer_menu.addAction(text)
+            action.setCheckable(True)
+            action.setChecked(name in AT_FIRST)
+            action.toggled.connect(self._redraw)
+        self.layer_button = self.tool_button("What is drawn", "tune-variant")
+        self.layer_button.setMenu(self.layer_menu)
+        self.layer_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         for widget in (self.back, self.title, self.ahead):
             self.header.addWidget(widget)
         self.header.addStretch(1)
-        self.header.addWidget(self.factor)
-        self.header.addWidget(self.factor_text)
-        self.plot = self.add_plot(0, "mm", "mm")
-        self.plot.setAspectLocked(True)
-        self.dimensions = QLabel(wordWrap=True)
-        self.canvas.parentWidget().layout().insertWidget(2, self.dimensions)
-        self.on_hover(self._hover)
-        self.on_click(lambda *_: self.setFocus())
-        self.setAccessibleName("Section")
+        for widget in (self.factor, self.factor_text, self.layer_button, self.menu_button):
+            self.header.addWidget(widget)
 
     def apply(self, state: SectionState) -> None:
         """Show `state`."""
-        if self.is_new_theme():
-            self.back.setIcon(theme.icon("chevron-left"))
-            self.ahead.setIcon(theme.icon("chevron-right"))
-        elif state == self._state:
+        if not self.is_new_theme() and state == self._state:
             return
         before, self._state = self._state, state
         self.show_filled(state.profile is not None)
-        if state.profile is None:
-            self.plot.clear()
+        if state.profile is None or state.cut is None:
+            for plot in self.plots():
+                plot.clear()
             return
         index, chainage = int(state.profile.profile_index[0]), float(state.profile.chainage[0])
         self.title.setText(f"Profile {index} · {chainage:.3f} m")
         self.title.setToolTip(f"{state.position} of {state.count} · {state.stack_name}")
         self.back.setEnabled(state.position > 1)
         self.ahead.setEnabled(state.position < state.count)
-        self.dimensions.setText(dimensions_text(state.profile))
+        self.dimensions.setText(dimensions_text(state.profile, state.cut))
         self._draw()
         if state.element is not before.element or before.profile is None:
-            self._fit()
+            self.fit()
 
     # Drawing
 
-    def _exaggerate(self) -> None:
+    def _redraw(self) -> None:
         self._draw()
-        self._fit()
+        self.fit()
+
+    def _shows(self, layer: str) -> bool:
+        return self.layers[layer].isChecked()
 
     def _draw(self) -> None:
-        state, factor = self._state, self.factor.value()
+        cut, factor = self._state.cut, self.factor.value()
         self.factor_text.setText(f"{factor}×")
-        self.plot.clear()
+        for plot in self.plots():
+            plot.clear()
         self.readout.clear()
-        reference, fitted = state.reference, state.fitted
-        if reference is None or fitted is None:
+        if cut is None:
             return
-        muted = theme.colour("muted")
-        data = QColor(*QUALITATIVE[0].tolist())
-        contour = ellipse_points(reference)
-        dashed = pg.mkPen(muted, width=1.5, style=Qt.PenStyle.DashLine)
-        self.plot.plot(*contour.T, pen=dashed, antialias=True)
-        self._draw_clock()
-        shown = ellipse_points(fitted)
-        if np.isfinite(shown).all():
-            curve = exaggerate(shown, reference, factor)
-            self.plot.plot(*curve.T, pen=pg.mkPen(theme.colour("accent"), width=2), antialias=True)
-        points = state.points_uv[:: max(1, -(-len(state.points_uv) // MAX_POINTS))]
-        if len(points):
+        muted, reference = theme.colour("muted"), cut.reference
+        if self._shows("reference"):
+            dashed = pg.mkPen(muted, width=1.5, style=Qt.PenStyle.DashLine)
+            self.plot.plot(*ellipse_points(reference).T, pen=dashed, antialias=True)
+        if self._shows("nominal") and cut.nominal is not None:
+            dotted = pg.mkPen(theme.colour("text"), width=1.2, style=Qt.PenStyle.DotLine)
+            self._draw_contour(cut.nominal, dotted, factor)
+        self._draw_clock(reference)
+        if self._shows("ellipse") and (factor == 1 or _is_around(cut.fitted, reference)):
+            self._draw_contour(cut.fitted, pg.mkPen(faint(_points_colour(), 0.9), width=1), factor)
+        if self._shows("points"):
+            points = cut.points_uv[:: max(1, -(-len(cut.points_uv) // MAX_POINTS))]
+            drawn = exaggerate(points, reference, factor)
             self.plot.addItem(
                 pg.ScatterPlotItem(
-                    *exaggerate(points, reference, factor).T,
+                    *drawn.T,
                     size=5,
-                    brush=faint(data, 0.8),
+                    brush=faint(_points_colour(), 0.8),
                     pen=pg.mkPen(None),
                     antialias=True,
                 )
             )
+        if self._shows("curve"):
+            pen = pg.mkPen(theme.colour("accent"), width=2)
+            for piece in curve_points(cut):
+                curve = exaggerate(piece, reference, factor)
+                self.plot.plot(*curve.T, pen=pen, antialias=True)
+        if self._shows("dimensions"):
+            self._draw_dimensions(cut, factor)
+        self._draw_curvature(cut)
 
-    def _draw_clock(self) -> None:
-        reference = self._state.reference
+    def _draw_contour(self, ellipse: Ellipse, pen: object, factor: int) -> None:
+        assert self._state.cut is not None
+        shown = ellipse_points(ellipse)
+        if np.isfinite(shown).all():
+            drawn = exaggerate(shown, self._state.cut.reference, factor)
+            self.plot.plot(*drawn.T, pen=pen, antialias=True)
+
+    def _draw_clock(self, reference: Ellipse) -> None:
         u, v = reference.centre_uv
         radius = reference.semi_major_mm
         muted = theme.colour("muted")
@@ -134,56 +180,143 @@ class SectionView(Chart):
         cross = pg.ScatterPlotItem([u], [v], symbol="+", size=11, pen=muted, brush=muted)
         self.plot.addItem(cross)
 
-    def _fit(self) -> None:
-        reference = self._state.reference
-        if reference is not None:
-            (u, v), reach = reference.centre_uv, 1.35 * reference.semi_major_mm
-            if len(self._state.points_uv):
-                drawn = exaggerate(self._state.points_uv, reference, self.factor.value())
-                away = np.linalg.norm(drawn - reference.centre_uv, axis=1)
+    def _draw_dimensions(self, cut: SectionCut, factor: int) -> None:
+        text_colour = theme.colour("text")
+        for number, dimension in enumerate(dimensions(cut)):
+            ends = exaggerate(dimension.ends_uv, cut.reference, factor)
+            is_depth = dimension.name in ("Depth", "Height")
+            pen = pg.mkPen(text_colour, width=2 if is_depth else 1)
+            self.plot.plot(*ends.T, pen=pen, symbol="+", symbolSize=7, symbolPen=pen)
+            # Labels of crossing diameters stand off the centre, towards different ends.
+            share = 0.0 if is_depth else 0.28 + 0.44 * (number % 2)
+            anchor = _outward_anchor(ends[0], cut.reference) if is_depth else (0.5, 0.5)
+            text = dimension.value if is_depth else dimension.text
+            label = pg.TextItem(text, color=text_colour, anchor=anchor)
+            label.fill = pg.mkBrush(faint(theme.colour("window"), 0.75))
+            label.setPos(*(ends[0] + share * (ends[1] - ends[0])))
+            self.plot.addItem(label)
+
+    def _draw_curvature(self, cut: SectionCut) -> None:
+        """Curvature times radius against the clock: 1 on a circle."""
+        is_shown = self._shows("curvature") and cut.curve is not None
+        self.curvature.setVisible(is_shown)
+        self.curvature.setMaximumHeight(16_777_215 if is_shown else 0)
+        if not is_shown:
+            return
+        round_line = pg.mkPen(theme.colour("muted"), width=1.5, style=Qt.PenStyle.DashLine)
+        self.curvature.addItem(pg.InfiniteLine(1.0, angle=0, pen=round_line))
+        radius, accent = cut.reference.semi_minor_mm / 1000, theme.colour("accent")
+        lowest, highest = 0.5, 1.5
+        for clocks in cut.curve.clocks():
+            value = radius * cut.curve.curvature_at(clocks)
+            sd = radius * cut.curve.curvature_sd_at(clocks)
+            degrees = np.rad2deg(clocks)
+            turns = (0, -360) if degrees[-1] > 360 else (0,)
+            for turn in turns:
+                edges = [
+                    pg.PlotDataItem(degrees + turn, value + side * sd, pen=pg.mkPen(None))
+                    for side in (-1, 1)
+                ]
+                for edge in edges:
+                    self.curvature.addItem(edge)
+                self.curvature.addItem(pg.FillBetweenItem(*edges, brush=faint(accent, 0.2)))
+                self.curvature.plot(
+                    degrees + turn, value, pen=pg.mkPen(accent, width=1.5), antialias=True
+                )
+            is_known = sd < 0.5
+            lowest = min(lowest, float(value[is_known].min(initial=lowest)))
+            highest = max(highest, float(value[is_known].max(initial=highest)))
+        self.curvature.setYRange(lowest, highest, padding=0.08)
+
+    def fit(self) -> None:
+        """Show the whole section."""
+        cut = self._state.cut
+        if cut is not None:
+            (u, v), reach = cut.reference.centre_uv, 1.35 * cut.reference.semi_major_mm
+            if len(cut.points_uv):
+                drawn = exaggerate(cut.points_uv, cut.reference, self.factor.value())
+                away = np.linalg.norm(drawn - cut.reference.centre_uv, axis=1)
                 reach = max(reach, 1.05 * float(np.percentile(away, 99)))
             self.plot.setRange(xRange=(u - reach, u + reach), yRange=(v - reach, v + reach))
+            self.curvature.setXRange(0, 360, padding=0.05)
+
+    # Copying
+
+    def heading(self) -> str:
+        """What section it is, and its dimensions."""
+        element = self._state.element
+        name = "" if element is None else element.label
+        return f"<b>{name}</b> · {self.title.text()}<br>{self.dimensions.text()}"
+
+    def numbers(self) -> Table:
+        """The points, with their distance from the undeformed contour and the curve there."""
+        cut = self._state.cut
+        if cut is None:
+            return {}
+        points, reference = cut.points_uv, cut.reference
+        clocks = np.array([clock_of(p, reference) for p in points])
+        curve, curvature = np.full(len(points), np.nan), np.full(len(points), np.nan)
+        if cut.curve is not None:
+            curve = 1000 * cut.curve.radius_at(clocks)
+            curvature = cut.curve.curvature_at(clocks)
+        relative = points - np.asarray(reference.centre_uv)
+        columns: dict[str, tuple[Array, int]] = {
+            "right_mm": (relative[:, 0], 3),
+            "up_mm": (relative[:, 1], 3),
+            "clock_deg": (np.rad2deg(clocks), 2),
+            "deviation_mm": (deviations(points, reference), 3),
+            "curve_radius_mm": (curve, 3),
+            "curvature_per_m": (curvature, 3),
+        }
+        order = np.argsort(clocks, kind="stable")
+        return {
+            title: [cell(float(v), decimals) for v in values[order]]
+            for title, (values, decimals) in columns.items()
+        }
 
     # Mouse and keys
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Step with the arrow keys."""
-        step = STEPS.get(Qt.Key(event.key()))
-        if step is None or self._state.profile is None:
+        """Step with the arrow keys, far with Page Up and Down, to the ends with Home and End."""
+        step = (STEPS | FAR).get(Qt.Key(event.key()))
+        if step is None or self._state.profile is None or event.modifiers() & _MODIFIERS:
             super().keyPressEvent(event)
             return
         self.step_requested.emit(step)
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        self.readout.setText(self._text_at(position) if plot is not None else "")
+        self.readout.setText(self._text_at(position) if plot is self.plot else "")
 
     def _text_at(self, position: QPointF) -> str:
-        reference, points = self._state.reference, self._state.points_uv
-        if reference is None or not len(points):
+        cut = self._state.cut
+        if cut is None or not len(cut.points_uv):
             return ""
         at = self.plot.vb.mapSceneToView(position)
-        drawn = exaggerate(points, reference, self.factor.value())
+        drawn = exaggerate(cut.points_uv, cut.reference, self.factor.value())
         away = np.hypot(*(drawn - (at.x(), at.y())).T) / self.plot.vb.viewPixelSize()[0]
         nearest = int(np.argmin(away))
         if away[nearest] > HOVER_PX:
             return ""
-        value = float(deviations(points[nearest : nearest + 1], reference)[0])
+        value = float(deviations(cut.points_uv[nearest : nearest + 1], cut.reference)[0])
         side = "outward" if value > 0 else "inward"
         return f"{format_measure(abs(value), unit='mm')} {side} of the undeformed contour"
 
 
-def dimensions_text(profile: Profiles) -> str:
-    """Return what is measured of the section, as far as the scan carries it."""
-    radius = format_measure(1000 * profile.radius[0], 1000 * profile.radius_sd[0], "mm")
-    arc = f"arc seen {np.rad2deg(profile.arc[0]):.0f}°"
-    ovality = float(profile.ovality[0])
-    if not np.isfinite(ovality):
-        return f"Radius {radius} · {arc} · diameters {NOT_MEASURABLE}: too little arc"
-    half = ovality * float(profile.radius[0])
-    widest, narrowest = (
-        format_measure(1000 * (2 * profile.radius[0] + side * half), unit="mm") for side in (1, -1)
-    )
-    return (
-        f"Radius {radius} · {arc} · Dmax {widest} · Dmin {narrowest}"
-        f" · ovality {format_measure(100 * ovality, unit='%')}"
-    )
+_MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier
+
+
+def _points_colour() -> QColor:
+    return QColor(*QUALITATIVE[0].tolist())
+
+
+def _is_around(ellipse: Ellipse, reference: Ellipse) -> bool:
+    """Whether the reference's centre lies well inside an ellipse: else it has no rays to it."""
+    offset = np.subtract(ellipse.centre_uv, reference.centre_uv)
+    return bool(np.linalg.norm(offset) < 0.5 * ellipse.semi_minor_mm)
+
+
+def _outward_anchor(place: Array, reference: Ellipse) -> tuple[float, float]:
+    """Where a label has its anchor so that it stands outside of a place on the contour."""
+    u, v = place - np.asarray(reference.centre_uv)
+    reach = max(abs(u), abs(v), 1e-9)
+    return 0.5 - 0.62 * u / reach, 0.5 + 0.9 * v / reach

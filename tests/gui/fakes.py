@@ -14,6 +14,8 @@ from pipegui.parts import Parts
 
 
 class FakeView(QWidget):
+    save_requested = Signal(str)
+
     def __init__(self) -> None:
         super().__init__()
         self.states: list[Any] = []
@@ -51,6 +53,8 @@ class FakeScene(FakeView):
 class FakeRadiusPlot(FakeView):
     profile_clicked = Signal(int, int)
     stack_chosen = Signal(int)
+    pin_toggled = Signal()
+    pins_cleared = Signal()
 
 
 class FakeSection(FakeView):

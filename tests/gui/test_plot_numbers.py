@@ -5,9 +5,8 @@ import pytest
 
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
 from pipegui.plots.pattern import index_at, pattern_of
-from pipegui.plots.section_view import dimensions_text
 from pipegui.plots.unrolled import from_clock, unroll
-from pipegui.view_state import Ellipse
+from pipegui.section_cut import Ellipse
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()
@@ -127,13 +126,3 @@ def test_that_an_ellipse_has_its_axes():
     reach = np.linalg.norm(ellipse_points(TILTED, 361) - TILTED.centre_uv, axis=1)
     assert reach.max() == pytest.approx(110, rel=1e-4)
     assert reach.min() == pytest.approx(80, rel=1e-4)
-
-
-def test_that_diameters_are_given_only_where_the_arc_carries_them():
-    whole = RESULT.profiles.of_element(DENTED, 0)[:1]
-    text = dimensions_text(whole)
-    assert "Dmax" in text
-    assert f"{np.rad2deg(whole.arc[0]):.0f}°" in text
-    half = RESULT.profiles.of_element(HALF_SEEN, 0)[:1]
-    assert "not measurable" in dimensions_text(half)
-    assert "Dmax" not in dimensions_text(half)

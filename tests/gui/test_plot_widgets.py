@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 
+from pipegui import commands
 from pipegui.document import Document, ProfileKey, Scan, Selection
 from pipegui.plots.deviation_map import DeviationMap
 from pipegui.plots.radius_plot import RadiusPlot
@@ -13,6 +14,7 @@ from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()
 LEFT = Qt.MouseButton.LeftButton
+DETECTED = Document(scans=(Scan("plant.laz", CLOUD, RESULT),))
 
 
 def states(selection):
@@ -55,7 +57,7 @@ def radius(qtbot, no_leaks) -> RadiusPlot:
 @pytest.mark.parametrize("row", [3, 40, 80])
 def test_that_a_click_on_a_point_names_its_profile(radius, qtbot, row, by_chainage):
     radius.x_axis.setCurrentIndex(int(by_chainage))
-    radius._fit()
+    radius.fit()
     profiles = RESULT.profiles.of_element(2, 0)
     x = profiles.chainage[row] if by_chainage else profiles.profile_index[row]
     y = 1000 * profiles.semi_minor[row]
@@ -230,3 +232,75 @@ def test_that_exaggeration_keeps_all_in_view(section):
     section.factor.setValue(20)
     assert section.factor_text.text() == "20×"
     assert np.ptp(section.plot.viewRange()[0]) > np.ptp(before[0])
+
+
+@pytest.mark.parametrize("layer", ["points", "curve", "ellipse", "reference", "dimensions"])
+def test_that_layers_of_the_section_can_be_left_out(section, layer):
+    n_items = len(section.plot.items)
+    section.layers[layer].setChecked(False)
+    assert len(section.plot.items) < n_items
+
+
+def test_that_page_and_end_keys_step_far(section, qtbot):
+    for key, step in ((Qt.Key.Key_PageUp, 10), (Qt.Key.Key_PageDown, -10)):
+        with qtbot.waitSignal(section.step_requested) as asked:
+            qtbot.keyClick(section, key)
+        assert asked.args == [step]
+    document = commands.select_profile(commands.select_element(DETECTED, 2), 0, 5)
+    last = commands.step_profile(document, 10**6).selection.profile
+    assert last.profile_index == RESULT.profiles.of_element(2, 0).profile_index[-1]
+
+
+# Several elements in one plot
+
+
+def test_that_pinned_elements_stay_in_the_plot(qtbot):
+    plot = shown(qtbot, RadiusPlot(), states(Selection(1, 2)).radius_plot)
+    n_points = len(plot.numbers()["element"])
+    document = commands.toggle_pin(commands.select_element(DETECTED, 9))
+    document = commands.select_element(document, 2)
+    plot.apply(resolve(document).radius_plot)
+    assert set(plot.numbers()["element"]) == {"Pipe 2", "Pipe 9"}
+    assert len(plot.numbers()["element"]) > n_points
+    assert "Pipe&nbsp;9" in plot.key.text()
+    assert not plot.pin.isChecked()
+    plot.apply(resolve(commands.select_element(document, 9)).radius_plot)
+    assert plot.pin.isChecked()
+    assert set(plot.numbers()["element"]) == {"Pipe 9"}
+
+
+def test_that_the_pin_asks_to_be_set(radius, qtbot):
+    with qtbot.waitSignal(radius.pin_toggled):
+        qtbot.mouseClick(radius.pin, LEFT)
+
+
+def test_that_the_seventh_pin_takes_the_first_one_off():
+    document = DETECTED
+    for element_id in range(1, 8):
+        document = commands.toggle_pin(commands.select_element(document, element_id))
+    assert document.view.pinned_elements == (2, 3, 4, 5, 6, 7)
+    assert commands.toggle_pin(document).view.pinned_elements == (2, 3, 4, 5, 6)
+
+
+def test_that_differences_from_the_fitted_radius_lie_about_zero(radius):
+    radius.shown["difference"].setChecked(True)
+    low, high = radius.radius.viewRange()[1]
+    assert low < 0 < high
+    assert high - low < 40
+
+
+def test_that_the_rules_limit_is_that_of_the_elements_own_diameter():
+    limit = states(Selection(1, 2)).radius_plot.dent_limit
+    assert limit.depth == pytest.approx(0.06 * 0.1683)
+    assert "6 %" in limit.text
+
+
+def test_that_what_is_not_wanted_is_not_drawn(radius):
+    n_items = len(radius.radius.items)
+    for name in ("semi_minor", "fitted", "band", "limit"):
+        radius.shown[name].setChecked(False)
+        assert len(radius.radius.items) < n_items
+        n_items = len(radius.radius.items)
+    assert radius.offset.isVisible()
+    radius.shown["centre"].setChecked(False)
+    assert not radius.offset.isVisible()

@@ -63,9 +63,9 @@ def test_that_a_clean_section_lies_on_its_reference_circle_in_the_clock_frame():
     """Points at known clock angles come out where a clock face has them."""
     document = commands.select_profile(commands.select_element(DETECTED, 7), 0, 10)
     section = resolve(document).section
-    relative = section.points_uv - section.reference.centre_uv
+    relative = section.cut.points_uv - section.cut.reference.centre_uv
     radius = np.hypot(*relative.T)
-    assert np.median(radius) == pytest.approx(section.reference.semi_minor_mm, abs=1000 * NOISE)
+    assert np.median(radius) == pytest.approx(section.cut.reference.semi_minor_mm, abs=1000 * NOISE)
     # Compare with pipe coordinates, which are tested on their own.
     index = np.flatnonzero(RESULT.element_id == 7)
     axis = RESULT.element(7).axis
@@ -83,9 +83,9 @@ def test_that_an_oblique_cut_of_a_round_pipe_lies_on_its_reference_ellipse():
     index = int(rows.profile_index[clean][5])
     document = commands.select_profile(commands.select_element(DETECTED, 7), 1, index)
     section = resolve(document).section
-    reference = section.reference
+    reference = section.cut.reference
     cos, sin = np.cos(reference.angle_rad), np.sin(reference.angle_rad)
-    u, v = (section.points_uv - reference.centre_uv).T
+    u, v = (section.cut.points_uv - reference.centre_uv).T
     along, across = cos * u + sin * v, -sin * u + cos * v
     level = np.hypot(along / reference.semi_major_mm, across / reference.semi_minor_mm)
     assert len(level) > 10
@@ -99,7 +99,7 @@ def test_that_a_bend_cut_twice_by_a_plane_shows_one_branch_only():
         document = commands.select_element(DETECTED, 3)
         document = commands.select_profile(document, int(stack_id), int(index))
         section = resolve(document).section
-        extent = np.hypot(*section.points_uv.T).max(initial=0)
+        extent = np.hypot(*section.cut.points_uv.T).max(initial=0)
         assert extent < 2.2 * 1000 * RESULT.element(3).radius
 
 
