@@ -21,6 +21,10 @@ class SettingsError(PipecoreError):
     """A setting is unknown, of the wrong kind or outside its bounds."""
 
 
+class EditError(PipecoreError):
+    """Elements cannot be changed in the way that was asked for."""
+
+
 class SceneError(PipecoreError):
     """A description of a scene for the simulator is not valid."""
 

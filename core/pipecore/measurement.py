@@ -46,8 +46,12 @@ def measure_elements(
     settings: DeformationSettings,
     fit: EllipseFit,
     progress: Progress,
+    others: tuple[Element, ...] = (),
 ) -> Measurement:
-    """Measure every element on all points around it."""
+    """Measure every element on all points around it.
+
+    `others` are not measured, but what touches an element there is no deformation of it.
+    """
     element_id = np.full(n_points, NO_ID, np.int32)
     deviation = np.full(n_points, np.nan, np.float32)
     elements, profiles = [], []
@@ -61,7 +65,7 @@ def measure_elements(
             element,
             xyz,
             normals,
-            neighbours_of(element, built.elements),
+            neighbours_of(element, built.elements + others),
             settings,
         )
         own = index[finding.belongs]

@@ -145,6 +145,8 @@ class Element:
     not_measurable : mapping of str to str
         Why what is nan could not be measured, by the name of the field; what does not
         apply to the kind is not in it.
+    name : str
+        What the user calls it, or "".
     """
 
     element_id: int
@@ -165,11 +167,12 @@ class Element:
     nominal: NominalSize | None = None
     gaps: tuple[tuple[float, float], ...] = ()
     not_measurable: Mapping[str, str] = field(default_factory=dict)
+    name: str = ""
 
     @property
     def label(self) -> str:
-        """What people call it, such as "Pipe 3" or "Bend 4"."""
-        return f"{_SPOKEN_KIND[self.kind]} {self.element_id}"
+        """What people call it: its own name, else such as "Pipe 3" or "Bend 4"."""
+        return self.name or f"{_SPOKEN_KIND[self.kind]} {self.element_id}"
 
     def radius_at(self, chainage: Array | float) -> Array:
         """Radius of the fitted surface about the axis at `chainage`, metres."""
@@ -440,6 +443,8 @@ class Result:
         positive; nan for points of none.
     seconds : dict
         Time spent per step.
+    edits : tuple of str
+        What was changed by hand since the detection, the first change first.
     """
 
     settings: Settings
@@ -454,6 +459,7 @@ class Result:
     element_id: NDArray[np.int32]
     deviation: NDArray[np.float32]
     seconds: dict[str, float]
+    edits: tuple[str, ...] = ()
 
     def element(self, element_id: int) -> Element:
         """Return the element with this id; `KeyError` if there is none."""

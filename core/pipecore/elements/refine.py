@@ -150,7 +150,7 @@ def refine_piece(
         misfit = section_misfit(clock[within], near.residual[within], extent.arc)
         fitted = Fitted(fit, axis, near.own[within], extent, misfit)
         model = fit.model
-        axis = _axis_through(model, axis.at(np.array([extent.low, extent.high])))
+        axis = axis_through(model, axis.at(np.array([extent.low, extent.high])))
         sigma = max(fit.sigma, 0.0005)
     return fitted and _placed(fitted, axis)
 
@@ -170,7 +170,7 @@ def axis_between(model: LineSurface | ArcSurface, low: float, high: float) -> Li
     return model.axis_between(low, high)
 
 
-def _axis_through(model: LineSurface | ArcSurface, ends: Array) -> LineAxis | ArcAxis:
+def axis_through(model: LineSurface | ArcSurface, ends: Array) -> LineAxis | ArcAxis:
     """The model's axis between the places nearest to two points."""
     if isinstance(model, LineSurface):
         low, high = (ends - model.middle) @ model.direction

@@ -45,6 +45,7 @@ def result_to_dict(result: Result) -> dict[str, Any]:
         "n_element_points": int(np.count_nonzero(result.element_id)),
         "settings": result.settings.to_dict(),
         "seconds": _plain(result.seconds),
+        "edits": list(result.edits),
         "stacks": _plain(result.stacks),
         "elements": _plain(result.elements),
         "profiles": _plain(result.profiles),

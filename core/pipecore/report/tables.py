@@ -54,6 +54,7 @@ ELEMENT_COLUMNS = (
     "n_gaps",
     "gaps_m",
     "not_measurable",
+    "name",
 )
 
 PROFILE_COLUMNS = (
@@ -212,6 +213,7 @@ def _element_row(element: Element, result: Result, place: FileCoordinates) -> li
         str(len(element.gaps)),
         cell(sum(end - start for start, end in element.gaps), 4),
         _reasons(element.not_measurable),
+        text_cell(element.name),
     ]
 
 

@@ -1,0 +1,116 @@
+"""Changes that need no point of the cloud: deleting, naming, sizing."""
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.errors import EditError
+from pipecore.geometry import LineAxis
+from pipecore.rules import judge, load_rule
+from pipecore.types import NO_ID, Element, ElementKind, NominalSize, Result
+
+
+def delete_elements(result: Result, element_ids: Collection[int]) -> Result:
+    """Take elements away, with their profiles and deformations.
+
+    Raises
+    ------
+    EditError
+        If there is no such element.
+    """
+    gone = [find(result, i) for i in sorted(set(element_ids))]
+    rest = without(result, {e.element_id for e in gone})
+    return noted(rest, "deleted " + listed(gone))
+
+
+def name_element(result: Result, element_id: int, name: str) -> Result:
+    """Call an element by a name; "" goes back to its kind and number."""
+    element = find(result, element_id)
+    name = " ".join(name.split())
+    renamed = with_element(result, replace(element, name=name))
+    return noted(renamed, f"named {replace(element, name='').label} “{name}”" if name else "")
+
+
+def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) -> Result:
+    """Say which catalogue size an element has; its deformations are judged anew.
+
+    Raises
+    ------
+    SettingsError
+        If the acceptance rule is no longer there.
+    """
+    element = find(result, element_id)
+    sized = replace(element, nominal=size)
+    rule = load_rule(result.settings.deformation.rule)
+    deformations = tuple(
+        replace(d, verdict=judge(d, sized, rule)) if d.element_id == element_id else d
+        for d in result.deformations
+    )
+    changed = replace(with_element(result, sized), deformations=deformations)
+    return noted(changed, f"{element.label} is {size.name if size else 'of no nominal size'}")
+
+
+def kinds_of(element: Element) -> tuple[ElementKind, ...]:
+    """What an element may be called without leaving its axis: its own kind is among them."""
+    if element.kind is ElementKind.SPHERE:
+        return (ElementKind.SPHERE,)
+    if isinstance(element.axis, LineAxis):
+        return (
+            ElementKind.CYLINDER,
+            ElementKind.CONE,
+            ElementKind.FLANGE,
+            ElementKind.TEE,
+            ElementKind.OTHER,
+        )
+    return ElementKind.TORUS, ElementKind.TEE, ElementKind.OTHER
+
+
+# For the other modules
+
+
+def find(result: Result, element_id: int) -> Element:
+    """Return an element; `EditError` if it is not there."""
+    try:
+        return result.element(element_id)
+    except KeyError as error:
+        raise EditError(f"There is no element {element_id}.") from error
+
+
+def listed(elements: Iterable[Element]) -> str:
+    """Name elements in a sentence."""
+    *others, last = [e.label for e in elements]
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def noted(result: Result, what: str) -> Result:
+    """Take note of a change."""
+    return replace(result, edits=(*result.edits, what)) if what else result
+
+
+def with_element(result: Result, element: Element) -> Result:
+    """Put an element in the place of the one with its id."""
+    elements = (element if e.element_id == element.element_id else e for e in result.elements)
+    return replace(result, elements=tuple(elements))
+
+
+def without(result: Result, element_ids: Collection[int]) -> Result:
+    """The result without some elements; their points belong to none."""
+    of_gone = on_elements(result.element_id, element_ids)
+    return replace(
+        result,
+        elements=tuple(e for e in result.elements if e.element_id not in element_ids),
+        deformations=tuple(d for d in result.deformations if d.element_id not in element_ids),
+        profiles=result.profiles[~np.isin(result.profiles.element_id, list(element_ids))],
+        element_id=np.where(of_gone, np.int32(NO_ID), result.element_id),
+        deviation=np.where(of_gone, np.float32(np.nan), result.deviation),
+    )
+
+
+def on_elements(element_id: NDArray[np.int32], element_ids: Collection[int]) -> NDArray[np.bool_]:
+    """Which points belong to one of some elements."""
+    highest = max([int(element_id.max(initial=NO_ID)), *element_ids])
+    table = np.zeros(highest + 1, np.bool_)
+    table[list(element_ids)] = True
+    return np.asarray(table[element_id])

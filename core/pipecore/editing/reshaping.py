@@ -1,0 +1,265 @@
+"""Merging, splitting and re-classifying: elements fitted and measured anew."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from pipecore.catalogues import nominal_size
+from pipecore.editing.changes import find, kinds_of, listed, noted, on_elements
+from pipecore.editing.measuring import Shape, fit_shape, measure_anew, part_of
+from pipecore.elements.extent import SHOWN_GAP
+from pipecore.errors import EditError
+from pipecore.geometry import ArcAxis, Array, LineAxis
+from pipecore.progress import NoProgress, Progress
+from pipecore.types import Element, ElementKind, PointCloud, Result
+
+STAGES = {"thinning": 0.2, "normals": 0.3, "deformations": 0.5}
+"""The stages in their order, with the share of the time that each usually takes."""
+
+MERGED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
+MAX_OFFSET = 0.3
+"""Axes of one line or arc leave it by less than this share of the radius."""
+MAX_TURN_COS = float(np.cos(np.deg2rad(8.0)))
+SAME_RADIUS = 0.05
+MIN_PART = 0.1
+"""Shortest part of a split element, in radii."""
+
+
+def merge_elements(
+    cloud: PointCloud,
+    result: Result,
+    element_ids: Collection[int],
+    progress: Progress = NoProgress(),
+) -> Result:
+    """Make one element of several on one line or one arc, such as a pipe behind an obstacle.
+
+    It takes the lowest of their ids, the name of the first that has one, and joins their runs.
+
+    Raises
+    ------
+    EditError
+        If they are not of one kind and size, or not on one line or arc.
+    CancelledError
+        From `progress`.
+    """
+    parts = [find(result, i) for i in sorted(set(element_ids))]
+    if len(parts) < 2:
+        raise EditError("Select at least two elements to merge.")
+    _check_alike(parts)
+    axis = _common_axis(parts)
+    first = parts[0]
+    ends = sorted(_span_on(axis, part) for part in parts)
+    between = tuple(
+        (a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > SHOWN_GAP * first.radius
+    )
+    n_points = [max(p.n_points, 1) for p in parts]
+    radius = float(np.average([p.radius for p in parts], weights=n_points))
+    is_cone = first.kind is ElementKind.CONE
+    start_radius, end_radius = _taper(axis, parts) if is_cone else (radius, radius)
+    merged = replace(
+        first,
+        axis=axis,
+        radius=start_radius,
+        radius_end=end_radius,
+        name=next((p.name for p in parts if p.name), ""),
+        gaps=tuple(sorted((*between, *_gaps_on(axis, parts)))),
+    )
+    gone = {p.element_id for p in parts}
+    shape = _shape_on(cloud, result, merged, gone)
+    merged = _sized(shape.element, result)
+    changed = measure_anew(cloud, result, gone, [merged], progress)
+    runs = {p.run_id for p in parts}
+    elements = (
+        replace(e, run_id=first.run_id) if e.run_id in runs else e for e in changed.elements
+    )
+    return noted(replace(changed, elements=tuple(elements)), f"merged {listed(parts)}")
+
+
+def split_element(
+    cloud: PointCloud,
+    result: Result,
+    element_id: int,
+    chainage: float,
+    progress: Progress = NoProgress(),
+) -> Result:
+    """Make two elements of one, cut at a chainage; the part before it keeps the id.
+
+    Raises
+    ------
+    EditError
+        If the cut is too near to an end, or the element is a sphere.
+    CancelledError
+        From `progress`.
+    """
+    whole = find(result, element_id)
+    if whole.kind is ElementKind.SPHERE:
+        raise EditError("A sphere cannot be split.")
+    length, least = whole.axis.length, MIN_PART * whole.radius
+    if not least <= chainage <= length - least:
+        raise EditError(
+            f"{whole.label} is {length:.3f} m long: "
+            f"split it between {least:.3f} and {length - least:.3f} m."
+        )
+    new_id = max(e.element_id for e in result.elements) + 1
+    middle_radius = float(whole.radius_at(chainage))
+    pieces = [
+        replace(whole, axis=_cut(whole.axis, 0.0, chainage), radius_end=middle_radius),
+        replace(
+            whole,
+            element_id=new_id,
+            axis=_cut(whole.axis, chainage, length),
+            radius=middle_radius,
+            name="",
+        ),
+    ]
+    parts = []
+    for piece, start in zip(pieces, (0.0, chainage), strict=True):
+        gaps = (
+            (max(low - start, 0.0), min(high - start, piece.axis.length))
+            for low, high in whole.gaps
+        )
+        piece_ = replace(piece, gaps=tuple((a, b) for a, b in gaps if b > a))
+        shape = _shape_on(cloud, result, piece_, {element_id}, must_fit=False)
+        parts.append(_sized(shape.element, result))
+    changed = measure_anew(cloud, result, {element_id}, parts, progress)
+    return noted(changed, f"split {whole.label} at {chainage:.3f} m")
+
+
+def change_kind(
+    cloud: PointCloud,
+    result: Result,
+    element_id: int,
+    kind: ElementKind,
+    progress: Progress = NoProgress(),
+) -> Result:
+    """Say what an element is; it is measured anew as that.
+
+    Raises
+    ------
+    EditError
+        If its axis cannot be that of such a kind.
+    CancelledError
+        From `progress`.
+    """
+    element = find(result, element_id)
+    if kind not in kinds_of(element):
+        raise EditError(f"{element.label} cannot be a {kind}: its axis is of another shape.")
+    changed = replace(element, kind=kind)
+    if (kind is ElementKind.CONE) != (element.kind is ElementKind.CONE):
+        if kind is not ElementKind.CONE:
+            mean = 0.5 * (element.radius + element.radius_end)
+            changed = replace(changed, radius=mean, radius_end=mean)
+        changed = _shape_on(cloud, result, changed, {element_id}).element
+    changed = _sized(changed, result)
+    anew = measure_anew(cloud, result, {element_id}, [changed], progress)
+    return noted(anew, f"{element.label} is a {kind}")
+
+
+def _shape_on(
+    cloud: PointCloud,
+    result: Result,
+    element: Element,
+    owners: Collection[int],
+    *,
+    must_fit: bool = True,
+) -> Shape:
+    """Fit an element to the points of its former owners between its ends."""
+    index = np.flatnonzero(on_elements(result.element_id, owners))
+    xyz = part_of(cloud, index).xyz.astype(np.float64)
+    shape = fit_shape(element, xyz)
+    if not shape.is_fitted and must_fit:
+        raise EditError(f"The points do not carry {element.label} as a {element.kind}.")
+    return shape
+
+
+def _sized(element: Element, result: Result) -> Element:
+    """The element with its catalogue size looked up, as a detection does."""
+    settings = result.settings.elements
+    if element.kind not in (ElementKind.CYLINDER, ElementKind.TORUS):
+        return replace(element, nominal=None)
+    size = nominal_size(2 * element.radius, settings.catalogue, settings.size_tolerance_pct)
+    return replace(element, nominal=size)
+
+
+def _check_alike(parts: Sequence[Element]) -> None:
+    first = parts[0]
+    for other in parts[1:]:
+        names = f"{first.label} and {other.label}"
+        if other.kind is not first.kind or type(other.axis) is not type(first.axis):
+            raise EditError(f"{names} are not of one kind; change the kind of one first.")
+        if first.kind not in MERGED:
+            raise EditError(f"{names} cannot be merged: only pipes, reducers and bends can.")
+        slack = SAME_RADIUS * min(first.radius, other.radius)
+        slack += 3 * float(np.nan_to_num(np.hypot(first.radius_sd, other.radius_sd)))
+        if first.kind is not ElementKind.CONE and abs(first.radius - other.radius) > slack:
+            raise EditError(
+                f"{names} are not of one size: their radii are {1000 * first.radius:.1f} and "
+                f"{1000 * other.radius:.1f} mm."
+            )
+
+
+def _common_axis(parts: Sequence[Element]) -> LineAxis | ArcAxis:
+    """The line or arc on which all parts lie, from the first end to the last."""
+    longest = max(parts, key=lambda p: p.axis.length)
+    samples = np.concatenate([p.axis.at(np.linspace(0, p.axis.length, 20)) for p in parts])
+    axis = longest.axis
+    if isinstance(axis, LineAxis):
+        weight = np.repeat([p.axis.length for p in parts], 20)
+        weight = weight / weight.sum()
+        middle = weight @ samples
+        centred = samples - middle
+        direction = np.linalg.eigh((weight[:, None] * centred).T @ centred)[1][:, -1]
+        if direction @ longest.axis.tangent(0.0) < 0:
+            direction = -direction
+        axis = LineAxis(middle, direction, 0.0)
+    chainage, rho, _ = axis.pipe_coordinates(samples)
+    name = "line" if isinstance(axis, LineAxis) else "arc"
+    for part, off in zip(parts, rho.reshape(len(parts), 20).max(axis=1), strict=True):
+        turn = abs(float(part.axis.tangent(0.0) @ axis.tangent(_span_on(axis, part)[0])))
+        if off > MAX_OFFSET * part.radius or turn < MAX_TURN_COS:
+            raise EditError(
+                f"{listed(parts)} do not lie on one {name}: {part.label} is "
+                f"{1000 * off:.0f} mm off it."
+            )
+    return _cut(axis, float(chainage.min()), float(chainage.max()))
+
+
+def _cut(axis: LineAxis | ArcAxis, low: float, high: float) -> LineAxis | ArcAxis:
+    """The part of an axis between two chainages, which may lie beyond its ends."""
+    if isinstance(axis, LineAxis):
+        return LineAxis(axis.at(low), axis.direction, high - low)
+    towards = (axis.at(low) - axis.centre) / axis.bend_radius
+    return ArcAxis(
+        axis.centre, axis.normal, towards, axis.bend_radius, (high - low) / axis.bend_radius
+    )
+
+
+def _span_on(axis: LineAxis | ArcAxis, part: Element) -> tuple[float, float]:
+    """Chainages of a part's ends on another axis, the lower first."""
+    ends = np.stack([part.axis.start, part.axis.end])
+    low, high = np.sort(axis.pipe_coordinates(ends)[0]).tolist()
+    return low, high
+
+
+def _gaps_on(axis: LineAxis | ArcAxis, parts: Sequence[Element]) -> list[tuple[float, float]]:
+    """The parts' own gaps, as chainages of another axis."""
+    found = []
+    for part in parts:
+        for gap in part.gaps:
+            low, high = np.sort(axis.pipe_coordinates(part.axis.at(np.array(gap)))[0]).tolist()
+            found.append((low, high))
+    return found
+
+
+def _taper(axis: LineAxis | ArcAxis, parts: Sequence[Element]) -> tuple[float, float]:
+    """Radii at both ends of a line through the radii at the parts' ends."""
+    chainage: list[Array] = []
+    radius: list[Array] = []
+    for part in parts:
+        ends = np.array([0.0, part.axis.length])
+        chainage.append(axis.pipe_coordinates(part.axis.at(ends))[0])
+        radius.append(part.radius_at(ends))
+    slope, start = np.polyfit(np.concatenate(chainage), np.concatenate(radius), 1)
+    return float(start), float(start + slope * axis.length)
