@@ -2,14 +2,24 @@
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.deformation import relate_deformations
 from pipecore.errors import EditError
 from pipecore.geometry import LineAxis
 from pipecore.rules import judge, load_rule
 from pipecore.types import NO_ID, Element, ElementKind, NominalSize, Result
+
+NOT_RELATED: dict[str, Any] = {
+    "fitting_id": NO_ID,
+    "fitting_distance": np.nan,
+    "next_id": NO_ID,
+    "next_distance": np.nan,
+    "interacts": False,
+}
 
 
 def delete_elements(result: Result, element_ids: Collection[int]) -> Result:
@@ -85,8 +95,13 @@ def listed(elements: Iterable[Element]) -> str:
 
 
 def noted(result: Result, what: str) -> Result:
-    """Take note of a change."""
-    return replace(result, edits=(*result.edits, what)) if what else result
+    """Take note of a change; relate the deformations to what is around them now."""
+    alone = [replace(d, **NOT_RELATED) for d in result.deformations]
+    return replace(
+        result,
+        deformations=relate_deformations(alone, result.elements),
+        edits=(*result.edits, what) if what else result.edits,
+    )
 
 
 def with_element(result: Result, element: Element) -> Result:
