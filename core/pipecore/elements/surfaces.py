@@ -1,17 +1,17 @@
 """Cylinders, cones, tori and spheres fitted to points: robust geometric least squares.
 
-Residuals are signed distances along the radius, positive outside. Each model gives
-residuals with their derivatives, and takes a step of its parameters; `fit_surface` is
-the same iteration for all.
+Residuals are signed distances along the radius, positive outside. The arithmetic is that
+of `pipecore._kernels.surfaces`, which also tells the parameters of each kind; here are the
+surfaces' names, and what a fit tells of them.
 """
 
-import math
 from dataclasses import dataclass
-from typing import Generic, Protocol, Self, TypeVar
+from typing import ClassVar, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import surfaces as kernels
 from pipecore.geometry import ArcAxis, LineAxis, unit
 
 Array = NDArray[np.float64]
@@ -26,43 +26,58 @@ ONE_SIDED = 0.55
 class SurfaceModel(Protocol):
     """A surface about an axis, with parameters that a fit can step."""
 
+    radius_parameter: ClassVar[int]
+    """Which parameter is the radius."""
+
     @property
     def radius(self) -> float:
         """Radius, at the start for a cone."""
         ...
 
     @property
-    def radius_parameter(self) -> int:
-        """Which parameter is the radius."""
+    def kind(self) -> int:
+        """Its kind as the kernels name it."""
         ...
 
-    def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
-        """Signed distances (n,), derivatives (n, p), and outward unit vectors (n, 3)."""
+    def numbers(self) -> Array:
+        """The surface as the kernels take it, shape (14,)."""
         ...
 
-    def stepped(self, step: Array) -> Self:
-        """The model with its parameters moved by `step` (p,)."""
+    def from_numbers(self, numbers: Array) -> Self:
+        """A surface of the same kind."""
         ...
 
 
 Model = TypeVar("Model", bound=SurfaceModel)
 
 
-def _across(direction: Array) -> tuple[Array, Array]:
-    x, y, z = direction.tolist()
-    # Scalars: for single vectors np.cross takes most of a fit's time.
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        e1 = np.array([0.0, -z, y]) / math.hypot(y, z)
-    elif abs(y) <= abs(z):
-        e1 = np.array([z, 0.0, -x]) / math.hypot(x, z)
-    else:
-        e1 = np.array([-y, x, 0.0]) / math.hypot(x, y)
-    u, v, w = e1.tolist()
-    return e1, np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+class _Measured:
+    """What all surfaces do by the kernels."""
+
+    def residuals(self: SurfaceModel, xyz: Array) -> tuple[Array, Array, Array]:
+        """Signed distances (n,), derivatives (n, p) and outward unit vectors (n, 3)."""
+        n = len(xyz)
+        residuals, outward = np.empty(n), np.empty((n, 3))
+        slopes = np.empty((n, kernels.n_parameters(self.kind)))
+        kernels.at_points(self.kind, self.numbers(), xyz, residuals, slopes, outward)
+        return residuals, slopes, outward
+
+    def stepped(self: Model, step: Array) -> Model:
+        """The surface with its parameters moved by `step` (p,)."""
+        numbers = self.numbers()
+        kernels.move(self.kind, numbers, step)
+        return self.from_numbers(numbers)
+
+
+def _numbers(place: Array, direction: Array, radius: float, shape: float) -> Array:
+    numbers = np.empty(14)
+    numbers[:3], numbers[3:6], numbers[12], numbers[13] = place, direction, radius, shape
+    kernels.place_frame(numbers)
+    return numbers
 
 
 @dataclass(frozen=True, eq=False)
-class LineSurface:
+class LineSurface(_Measured):
     """A cylinder, or with `is_tapered` a cone: radius + slope · chainage from the middle."""
 
     middle: Array
@@ -71,38 +86,29 @@ class LineSurface:
     slope: float = 0.0
     is_tapered: bool = False
 
-    radius_parameter = 4
+    radius_parameter: ClassVar[int] = 4
+
+    @property
+    def kind(self) -> int:
+        """Cone or cylinder."""
+        return kernels.CONE if self.is_tapered else kernels.CYLINDER
 
     @property
     def position(self) -> Array:
         """A point that tells it from others."""
         return self.middle
 
-    def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
-        """Signed distances, derivatives and outward unit vectors."""
-        e1, e2 = _across(self.direction)
-        q = xyz - self.middle
-        s, u, v = q @ self.direction, q @ e1, q @ e2
-        rho = np.hypot(u, v)
-        cos, sin = u / rho, v / rho
-        scale = 1.0 / np.hypot(1.0, self.slope)
-        columns = [-cos, -sin, -s * cos, -s * sin, -np.ones_like(s)]
-        if self.is_tapered:
-            columns.append(-s)
-        outward = cos[:, None] * e1 + sin[:, None] * e2
-        if self.slope:
-            outward = scale * (outward - self.slope * self.direction)
-        residual = scale * (rho - self.radius - self.slope * s)
-        return residual, scale * np.stack(columns, axis=1), outward
+    def numbers(self) -> Array:
+        """The surface as the kernels take it."""
+        return _numbers(self.middle, self.direction, self.radius, self.slope)
 
-    def stepped(self, step: Array) -> "LineSurface":
-        """The model moved by a step of offset (2), tilt (2), radius and slope."""
-        e1, e2 = _across(self.direction)
+    def from_numbers(self, numbers: Array) -> "LineSurface":
+        """A surface of the same kind."""
         return LineSurface(
-            self.middle + step[0] * e1 + step[1] * e2,
-            unit(self.direction + step[2] * e1 + step[3] * e2),
-            self.radius + step[4],
-            self.slope + step[5] if self.is_tapered else 0.0,
+            numbers[:3].copy(),
+            numbers[3:6].copy(),
+            float(numbers[12]),
+            float(numbers[13]),
             self.is_tapered,
         )
 
@@ -116,7 +122,7 @@ class LineSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class ArcSurface:
+class ArcSurface(_Measured):
     """A torus about the circle of `bend_radius` around `centre`."""
 
     centre: Array
@@ -124,46 +130,22 @@ class ArcSurface:
     bend_radius: float
     radius: float
 
-    radius_parameter = 6
+    radius_parameter: ClassVar[int] = 6
+    kind: ClassVar[int] = kernels.TORUS
 
     @property
     def position(self) -> Array:
         """A point that tells it from others."""
         return self.centre
 
-    def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
-        """Signed distances, derivatives and outward unit vectors."""
-        e1, e2 = _across(self.normal)
-        q = xyz - self.centre
-        u, v, h = q @ e1, q @ e2, q @ self.normal
-        in_plane = np.hypot(u, v)
-        a = in_plane - self.bend_radius
-        rho = np.hypot(a, h)
-        cos, sin = a / rho, h / rho
-        out = (u / in_plane)[:, None] * e1 + (v / in_plane)[:, None] * e2
-        outward = cos[:, None] * out + sin[:, None] * self.normal
-        # Tilting the normal by w: the height changes by u·w1 + v·w2.
-        per_height = sin - cos * h / in_plane
-        columns = np.concatenate(
-            [
-                -outward,
-                (per_height * u)[:, None],
-                (per_height * v)[:, None],
-                -cos[:, None],
-                -np.ones((len(xyz), 1)),
-            ],
-            axis=1,
-        )
-        return rho - self.radius, columns, outward
+    def numbers(self) -> Array:
+        """The surface as the kernels take it."""
+        return _numbers(self.centre, self.normal, self.radius, self.bend_radius)
 
-    def stepped(self, step: Array) -> "ArcSurface":
-        """The model moved by a step of centre (3), tilt (2), bend radius and radius."""
-        e1, e2 = _across(self.normal)
+    def from_numbers(self, numbers: Array) -> "ArcSurface":
+        """A surface of the same kind."""
         return ArcSurface(
-            self.centre + step[:3],
-            unit(self.normal + step[3] * e1 + step[4] * e2),
-            self.bend_radius + step[5],
-            self.radius + step[6],
+            numbers[:3].copy(), numbers[3:6].copy(), float(numbers[13]), float(numbers[12])
         )
 
     def axis_from(self, towards_start: Array, angle: float) -> ArcAxis:
@@ -173,30 +155,27 @@ class ArcSurface:
 
 
 @dataclass(frozen=True, eq=False)
-class SphereSurface:
+class SphereSurface(_Measured):
     """A sphere."""
 
     centre: Array
     radius: float
 
-    radius_parameter = 3
+    radius_parameter: ClassVar[int] = 3
+    kind: ClassVar[int] = kernels.SPHERE
 
     @property
     def position(self) -> Array:
         """A point that tells it from others."""
         return self.centre
 
-    def residuals(self, xyz: Array) -> tuple[Array, Array, Array]:
-        """Signed distances, derivatives and outward unit vectors."""
-        q = xyz - self.centre
-        rho = np.linalg.norm(q, axis=1)
-        outward = q / rho[:, None]
-        columns = np.concatenate([-outward, -np.ones((len(q), 1))], axis=1)
-        return rho - self.radius, columns, outward
+    def numbers(self) -> Array:
+        """The surface as the kernels take it."""
+        return _numbers(self.centre, np.array([0.0, 0.0, 1.0]), self.radius, 0.0)
 
-    def stepped(self, step: Array) -> "SphereSurface":
-        """The model moved by a step of centre (3) and radius."""
-        return SphereSurface(self.centre + step[:3], self.radius + step[3])
+    def from_numbers(self, numbers: Array) -> "SphereSurface":
+        """Another sphere."""
+        return SphereSurface(numbers[:3].copy(), float(numbers[12]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,11 +199,6 @@ def robust_sigma(residuals: Array) -> float:
     return float(1.4826 * np.median(np.abs(residuals)))
 
 
-def _tukey_weights(residuals: Array, reach: float) -> Array:
-    """Weights that fall to zero at `reach`."""
-    return np.where(np.abs(residuals) < reach, (1 - (residuals / reach) ** 2) ** 2, 0.0)
-
-
 def fit_surface(
     model: Model, xyz: Array, scale: float, n_iterations: int = 30
 ) -> SurfaceFit[Model] | None:
@@ -244,49 +218,24 @@ def fit_surface(
     SurfaceFit or None
         None where the points do not carry the surface.
     """
-    for _ in range(n_iterations):
-        residual, jacobian, _ = model.residuals(xyz)
-        reach = 4.685 * scale
-        weight = _tukey_weights(residual, reach)
-        weighted = weight[:, None] * jacobian
-        normal_matrix = jacobian.T @ weighted
-        n_used = int((weight > 0).sum())
-        if n_used < 3 * jacobian.shape[1]:
-            return None
-        diagonal = np.sqrt(np.maximum(np.diag(normal_matrix), 1e-300))
-        scaled = normal_matrix / np.outer(diagonal, diagonal)
-        if np.linalg.cond(scaled) > 1e10:
-            return None
-        step = np.linalg.solve(scaled, -(weighted.T @ residual) / diagonal) / diagonal
-        model = model.stepped(step)
-        if not model.radius > 0:
-            return None
-        shown = robust_sigma(residual[np.abs(residual) < reach])
-        change = abs(shown - scale)
-        scale = min(scale, max(shown, 0.7 * scale, 1e-5))
-        if np.abs(jacobian @ step).max() < 1e-6 and change < 0.02 * scale:
-            break
-    residual, jacobian, outward = model.residuals(xyz)
-    reach = 4.685 * scale
-    is_used = np.abs(residual) < reach
-    n, p = int(is_used.sum()), jacobian.shape[1]
+    kind, numbers = model.kind, model.numbers()
+    scale = kernels.fit_robustly(kind, numbers, xyz, scale, n_iterations)
+    if not scale > 0:
+        return None
+    reach = kernels.TUKEY * scale
+    p = kernels.n_parameters(kind)
+    # Huber's covariance of an M-estimator; points need not all scatter alike.
+    information, scatter, beam = np.empty((p, p)), np.empty((p, p)), np.empty(3)
+    n, sigma = kernels.judge_fit(kind, numbers, xyz, reach, information, scatter, beam)
     if n < 3 * p:
         return None
-    residual, jacobian, outward = residual[is_used], jacobian[is_used], outward[is_used]
-    # Huber's covariance of an M-estimator; points need not all scatter alike.
-    ratio = (residual / reach) ** 2
-    pull = _tukey_weights(residual, reach) * residual
-    slope = float(((1 - ratio) * (1 - 5 * ratio)).mean())
-    inverse = np.linalg.pinv(slope * jacobian.T @ jacobian)
-    scatter = (pull[:, None] ** 2 * jacobian).T @ jacobian * (n / (n - p))
-    sigma = robust_sigma(residual)
-    on_surface = xyz[is_used] - residual[:, None] * outward
-    shift = inverse @ _beam_pull(model, on_surface, outward, residual, reach)
-    return SurfaceFit(model.stepped(shift), inverse @ scatter @ inverse, sigma, n)
+    inverse = np.linalg.pinv(information)
+    kernels.move(kind, numbers, inverse @ _beam_pull(kind, numbers, xyz, reach, beam, p))
+    return SurfaceFit(model.from_numbers(numbers), inverse @ scatter @ inverse, sigma, n)
 
 
 def _beam_pull(
-    model: SurfaceModel, xyz: Array, outward: Array, residuals: Array, reach: float
+    kind: int, numbers: Array, xyz: Array, reach: float, facing: Array, n_parameters: int
 ) -> Array:
     """What noise along the laser's beam adds to the normal equations, on average.
 
@@ -300,30 +249,26 @@ def _beam_pull(
 
     Parameters
     ----------
-    model : SurfaceModel
-    xyz, outward : ndarray, shape (n, 3)
-        Points on the surface and its normals there.
-    residuals : ndarray, shape (n,)
-        The measured points' distances from the surface, metres.
+    kind : int
+    numbers : ndarray
+        The surface as the kernels take it.
+    xyz : ndarray, shape (n, 3)
     reach : float
         Distance from which on points do not count, metres.
+    facing : ndarray, shape (3,)
+        Mean of the surface's normals at the points.
+    n_parameters : int
 
     Returns
     -------
     ndarray, shape (p,)
         Σ Jᵀ·residual, to be taken off.
     """
-    beam = outward.mean(axis=0)
-    one_sidedness = float(np.linalg.norm(beam))
-    n_parameters = model.residuals(xyz[:1])[1].shape[1]
-    if one_sidedness < ONE_SIDED:
-        return np.zeros(n_parameters)
-    beam /= one_sidedness
-    facing = outward @ beam
-    is_faced = facing > 0.3
-    noise = robust_sigma(residuals[is_faced] / facing[is_faced])
     pull = np.zeros(n_parameters)
-    for step, share in zip(*NORMAL_STEPS, strict=True):
-        residual, jacobian, _ = model.residuals(xyz + step * noise * beam)
-        pull += share * jacobian.T @ (_tukey_weights(residual, reach) * residual)
+    one_sidedness = float(np.linalg.norm(facing))
+    if one_sidedness >= ONE_SIDED:
+        beam = facing / one_sidedness
+        noise = kernels.noise_along(kind, numbers, xyz, reach, beam)
+        steps, shares = NORMAL_STEPS
+        kernels.pull_along(kind, numbers, xyz, reach, beam, steps * noise, shares, pull)
     return pull
