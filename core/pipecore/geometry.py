@@ -63,6 +63,11 @@ class Axis(Protocol):
         """Unit vectors to 12:00 and to 3:00 at `chainage`, each (n, 3) or (3,)."""
         ...
 
+    @property
+    def numbers(self) -> Array:
+        """The axis as `pipecore._kernels.axes` takes it, shape (17,)."""
+        ...
+
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
         """Chainage, distance from the axis and clock angle of `points` (n, 3), each (n,).
 
@@ -138,6 +143,13 @@ class LineAxis:
         shape = (*np.shape(chainage), 3)
         up, right = self._up_right
         return np.broadcast_to(up, shape), np.broadcast_to(right, shape)
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The axis as the kernels take it."""
+        up, right = self._up_right
+        shape = [0.0, 0.0, 1.0, 0.0, self.length]
+        return np.concatenate([self.start, self.direction, up, right, shape])
 
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
         """Chainage, distance and clock angle of `points` (n, 3)."""
@@ -223,6 +235,15 @@ class ArcAxis:
         # Clockwise of `outward`, seen along t = normal × outward, lies t × outward = -normal.
         cos, sin = np.cos(self._clock_of_outward), np.sin(self._clock_of_outward)
         return cos * outward + sin * self.normal, sin * outward - cos * self.normal
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The axis as the kernels take it."""
+        cos, sin = np.cos(self._clock_of_outward), np.sin(self._clock_of_outward)
+        shape = [self.bend_radius, self.bend_angle / 2, cos, sin, self.length]
+        return np.concatenate(
+            [self.centre, self.normal, self.towards_start, self._ahead_at_start, shape]
+        )
 
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
         """Chainage, distance and clock angle of `points` (n, 3)."""

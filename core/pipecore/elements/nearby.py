@@ -1,18 +1,73 @@
 """All points of the full cloud around an axis."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from pipecore._kernels import nearby as kernels
+from pipecore._kernels import voxels
 from pipecore._kernels.grouping import group_by_label
+from pipecore.elements.surfaces import SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.surface import Surface
+from pipecore.surface.grid import cell_numbers, empty_table
 from pipecore.types import PointCloud
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 INNER, OUTER = 0.4, 1.3
 """The neighbourhood of an axis, in radii: deep dents inside, what touches outside."""
+CELL_VOXELS = 6.0
+"""Edge of the cells in which thinned points are looked up, in voxels."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointsOn:
+    """Thinned points on a surface, in the order of their indices, and what lies inside it.
+
+    Parameters
+    ----------
+    own : ndarray of int, shape (n,)
+    residual, chainage, clock, lean : ndarray, shape (n,)
+        Distance from the surface, pipe coordinates, and the angle from the surface's normal
+        to the point's own, towards increasing clock.
+    inside : tuple of ndarray, each of shape (m,)
+        Chainage and clock of points well inside the surface that face as it does.
+    """
+
+    own: Indices
+    residual: Array
+    chainage: Array
+    clock: Array
+    lean: Array
+    inside: tuple[Array, Array]
+
+
+def _numbered_cells(
+    keys: NDArray[np.int64],
+) -> tuple[NDArray[np.int32], int, tuple[NDArray[np.int64], NDArray[np.int32]]]:
+    """Ids of the cells of points, how many there are, and the table from cells to ids.
+
+    The table grows with the cells, which are far fewer than the points.
+    """
+    chunk = 1 << 17
+    room = 2 * chunk
+    table_keys, table_ids = empty_table(room)
+    ids = np.empty(len(keys), np.int32)
+    n_cells = 0
+    for start in range(0, len(keys), chunk):
+        if n_cells + chunk > room:
+            room *= 2
+            used = table_keys != voxels.EMPTY
+            known = np.empty(n_cells, np.int64)
+            known[table_ids[used]] = table_keys[used]
+            table_keys, table_ids = empty_table(room)
+            voxels.fill_table(known, table_keys, table_ids)
+        part = slice(start, start + chunk)
+        n_cells = voxels.number_voxels(keys[part], table_keys, table_ids, ids[part], n_cells)
+    return ids, n_cells, (table_keys, table_ids)
 
 
 class NearbyPoints:
@@ -21,45 +76,78 @@ class NearbyPoints:
     def __init__(self, cloud: PointCloud, surface: Surface) -> None:
         self._cloud = cloud
         self.surface = surface
-        self._tree = cKDTree(surface.xyz)
-        self._is_found = np.zeros(len(surface.xyz), np.bool_)
         self._members, self._starts = group_by_label(surface.parent, len(surface.xyz))
+        edge = CELL_VOXELS * surface.voxel
+        keys, low, n_y, n_z = cell_numbers(surface.xyz, edge)
+        cell, n_cells, (table_keys, table_ids) = _numbered_cells(keys)
+        self._grid = low, edge, n_y, n_z, table_keys, table_ids
+        self._cells: tuple[Indices, Indices] = group_by_label(cell, n_cells)
 
-    def thinned(self, axis: Axis, radius: float, margin: float) -> NDArray[np.intp]:
+    def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
-        step = max(0.7 * radius, self.surface.voxel)
-        n = max(2, int(np.ceil((axis.length + 2 * margin) / step)) + 1)
-        places = axis.at(np.linspace(-margin, axis.length + margin, n))
-        half_step = 0.5 * (axis.length + 2 * margin) / (n - 1)
-        balls = self._tree.query_ball_point(places, float(np.hypot(OUTER * radius, half_step)))
-        for ball in balls:
-            self._is_found[ball] = True
-        found = np.flatnonzero(self._is_found)
-        self._is_found[found] = False
-        if len(found) == 0:
-            return found
-        chainage, rho, _ = axis.pipe_coordinates(self.surface.xyz[found])
-        inside = (rho > INNER * radius) & (rho < OUTER * radius)
-        return found[inside & (chainage > -margin) & (chainage < axis.length + margin)]
+        inner, outer = INNER * radius, OUTER * radius
+        cells = kernels.cells_around(*self._grid, axis.numbers, inner, outer, margin)
+        return np.asarray(
+            kernels.points_around(
+                self.surface.xyz, *self._cells, cells, axis.numbers, inner, outer, margin
+            )
+        )
 
-    def usual_spacing(self, thinned: NDArray[np.intp]) -> float:
+    def on_surface(
+        self,
+        model: SurfaceModel,
+        axis: Axis,
+        margin: float,
+        is_free: NDArray[np.bool_],
+        *,
+        band: float,
+        depth: float,
+        min_cos: float,
+    ) -> PointsOn:
+        """Free thinned points on a surface about an axis, and what lies inside it.
+
+        Parameters
+        ----------
+        model : SurfaceModel
+        axis : Axis
+        margin : float
+            How far beyond the axis's ends points are looked for, metres.
+        is_free : ndarray of bool
+            Thinned points that may be on the surface.
+        band, depth : float
+            Points are on it up to the former distance, and inside from the latter on.
+        min_cos : float
+            Least cosine between a point's normal and the surface's.
+        """
+        inner, outer = INNER * model.radius, OUTER * model.radius
+        cells = kernels.cells_around(*self._grid, axis.numbers, inner, outer, margin)
+        own, table, inside = kernels.points_on(
+            self.surface.xyz, self.surface.normals, is_free, *self._cells, cells, axis.numbers,
+            inner, outer, margin, model.kind, model.numbers(), band, depth, min_cos,
+        )  # fmt: skip
+        residual, chainage, clock, lean = np.ascontiguousarray(table.T)
+        return PointsOn(own, residual, chainage, clock, lean, (inside[:, 0], inside[:, 1]))
+
+    def usual_spacing(self, thinned: Indices) -> float:
         """Distance between neighbours among some thinned points, not below the thinning's."""
         if len(thinned) == 0:
             return self.surface.voxel
         return max(self.surface.voxel, float(np.nanmedian(self.surface.spacing[thinned])))
 
-    def within_ball(self, centre: Array, radius: float) -> NDArray[np.intp]:
+    def within_ball(self, centre: Array, radius: float) -> Indices:
         """Thinned points within `radius` of a place, in order."""
-        return np.sort(np.asarray(self._tree.query_ball_point(centre, radius), np.intp))
-
-    def of_cloud(self, thinned: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array, Array]:
-        """Indices, coordinates and normals (of their thinned point) of the cloud's points."""
-        sizes = self._starts[thinned + 1] - self._starts[thinned]
-        first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.intp)
-        rows = np.arange(sizes.sum()) + np.repeat(self._starts[thinned] - first, sizes)
-        index = self._members[rows]
-        return (
-            index,
-            self._cloud.xyz[index].astype(np.float64),
-            np.repeat(self.surface.normals[thinned], sizes, axis=0),
+        return np.asarray(
+            kernels.points_in_ball(*self._grid, self.surface.xyz, *self._cells, centre, radius)
         )
+
+    def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:
+        """Indices, coordinates and normals (of their thinned point) of the cloud's points.
+
+        Points behind one thinned point are in the order of their coordinates, so that the
+        cloud's own order does not matter.
+        """
+        sizes = self._starts[thinned + 1] - self._starts[thinned]
+        n = int(sizes.sum())
+        index, xyz = np.empty(n, np.intp), np.empty((n, 3))
+        kernels.behind(self._members, self._starts, thinned, self._cloud.xyz, index, xyz)
+        return index, xyz, np.repeat(self.surface.normals[thinned], sizes, axis=0)

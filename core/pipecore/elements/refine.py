@@ -124,16 +124,14 @@ def refine_piece(
         if is_final and not (fitted and is_promising(fitted)):
             return None
         margin = _margin(axis, model.radius, round_)
-        thinned = nearby.thinned(axis, model.radius, margin)
-        near = _points_on(model, thinned[is_free[thinned]], nearby, sigma)
-        inside = _points_inside(model, thinned, nearby)
-        inside_chainage, _, inside_clock = axis.pipe_coordinates(inside)
-        chainage, _, clock = axis.pipe_coordinates(nearby.surface.xyz[near.own])
-        spacing = nearby.usual_spacing(near.own)
-        lean = _lean(nearby.surface.normals[near.own], near.outward, axis.tangent(chainage))
+        near = nearby.on_surface(
+            model, axis, margin, is_free,
+            band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
+        )  # fmt: skip
+        chainage, clock = near.chainage, near.clock
         extent = find_extent(
-            chainage, clock, near.residual, lean, (inside_chainage, inside_clock),
-            axis.length, model.radius, spacing, sigma,
+            chainage, clock, near.residual, near.lean, near.inside,
+            axis.length, model.radius, nearby.usual_spacing(near.own), sigma,
         )  # fmt: skip
         if extent is None:
             return None
@@ -190,34 +188,9 @@ def _margin(axis: LineAxis | ArcAxis, radius: float, round_: int) -> float:
     return radius if round_ == 0 else 0.5 * axis.length + 4.0 * radius
 
 
-@dataclass(frozen=True, eq=False)
-class _Near:
-    own: Indices
-    residual: Array
-    outward: Array
-
-
-def _points_on(
-    model: LineSurface | ArcSurface | SphereSurface,
-    thinned: Indices,
-    nearby: NearbyPoints,
-    sigma: float,
-) -> _Near:
-    """Thinned points near a surface with normals like its own."""
-    residual, _, outward = model.residuals(nearby.surface.xyz[thinned])
-    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
-    on = (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
-    return _Near(thinned[on], residual[on], outward[on])
-
-
-def _points_inside(
-    model: LineSurface | ArcSurface, thinned: Indices, nearby: NearbyPoints
-) -> Array:
-    """Thinned points well inside a surface with normals like its own."""
-    xyz = nearby.surface.xyz[thinned]
-    residual, _, outward = model.residuals(xyz)
-    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
-    return np.asarray(xyz[(residual < -INSIDE * model.radius) & (cosine > RADIAL_COS)])
+def _band(sigma: float) -> float:
+    """Distance up to which points are on a surface."""
+    return max(5.0 * sigma, 0.0025)
 
 
 def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
@@ -225,14 +198,6 @@ def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
     if len(rows) <= limit:
         return rows
     return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
-
-
-def _lean(normals: Array, outward: Array, tangent: Array) -> Array:
-    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
-    clockwise = np.cross(tangent, outward)
-    ahead = np.einsum("ij,ij->i", normals, clockwise)
-    out = np.einsum("ij,ij->i", normals, outward)
-    return np.asarray(np.arctan(ahead / np.where(out == 0.0, np.inf, out)))
 
 
 def _fit_to(
@@ -247,9 +212,7 @@ def _fit_to(
         return None
     if is_final:
         _, points, _ = nearby.of_cloud(thinned)
-        if len(points) > MAX_FIT_POINTS:
-            # In an order of their own, so that the cloud's order does not matter.
-            points = _evenly(points[np.lexsort(points.T)], MAX_FIT_POINTS)
+        points = _evenly(points, MAX_FIT_POINTS)
     else:
         points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
     fit = fit_surface(model, points, scale)
@@ -288,14 +251,24 @@ def _refine_sphere(
         if is_final and not (fitted and is_promising(fitted)):
             return None
         ball = nearby.within_ball(model.centre, 1.2 * model.radius)
-        near = _points_on(model, ball[is_free[ball]], nearby, sigma)
-        fit = _fit_to(model, near.own, nearby, 3.0 * sigma, is_final)
+        own = _on_sphere(model, ball[is_free[ball]], nearby, sigma)
+        fit = _fit_to(model, own, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
         model = fit.model
         sigma = max(fit.sigma, 0.0005)
-        fitted = _fitted_sphere(fit, near.own, nearby)
+        fitted = _fitted_sphere(fit, own, nearby)
     return fitted
+
+
+def _on_sphere(
+    model: SphereSurface, thinned: Indices, nearby: NearbyPoints, sigma: float
+) -> Indices:
+    """Thinned points near a sphere with normals like its own."""
+    residual, _, outward = model.residuals(nearby.surface.xyz[thinned])
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
+    on = (cosine > RADIAL_COS) & (np.abs(residual) < _band(sigma))
+    return np.asarray(thinned[on])
 
 
 def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:
