@@ -1,0 +1,48 @@
+"""Pipe coordinates of points about straight and circular axes.
+
+An axis is seventeen numbers: the start of a line or the centre of an arc (0-2), the direction
+or the normal (3-5), the unit vectors to 12:00 and 3:00 of a line, or to the start of an arc and
+ahead there (6-11), the bend radius, 0 for a line (12), half the bend angle (13), cosine and
+sine of the clock angle of the extrados (14, 15), and the length (16).
+"""
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def polar(up, right):
+    """Distance and clock angle in [0, 2π)."""
+    clock = math.atan2(right, up)
+    if clock < 0.0:
+        clock += 2.0 * math.pi
+        # A hair before 12:00 rounds to a full turn.
+        if clock >= 2.0 * math.pi:
+            clock = 0.0
+    return math.sqrt(up * up + right * right), clock
+
+
+@njit(cache=True, nogil=True)
+def across_axis(axis, x, y, z):
+    """Chainage of a point, and how far up and right of the axis it is."""
+    px, py, pz = x - axis[0], y - axis[1], z - axis[2]
+    along = px * axis[3] + py * axis[4] + pz * axis[5]
+    a = px * axis[6] + py * axis[7] + pz * axis[8]
+    b = px * axis[9] + py * axis[10] + pz * axis[11]
+    bend, half = axis[12], axis[13]
+    if bend == 0.0:
+        return along, a, b
+    # The cut of the circle is put opposite the middle of the arc.
+    angle = half + (math.atan2(b, a) - half + math.pi) % (2.0 * math.pi) - math.pi
+    outward, side = math.sqrt(a * a + b * b) - bend, -along
+    cos, sin = axis[14], axis[15]
+    return angle * bend, cos * outward - sin * side, sin * outward + cos * side
+
+
+@njit(cache=True, nogil=True)
+def pipe_coordinates(axis, xyz, chainage, rho, clock):
+    """Write chainage, distance from the axis and clock angle of points (n, 3)."""
+    for i in range(xyz.shape[0]):
+        chainage[i], up, right = across_axis(axis, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+        rho[i], clock[i] = polar(up, right)

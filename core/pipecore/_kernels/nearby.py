@@ -1,0 +1,226 @@
+"""Points around an axis or a place, from a hashed grid of cells.
+
+A grid is its lower corner and edge, the numbers of cells along y and z, a hash table from
+the numbers of cells to their ids, and the points of each cell: `members` from `starts[id]`
+to `starts[id + 1]`.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.axes import across_axis, polar
+from pipecore._kernels.surfaces import MOST_PARAMETERS, at_point
+from pipecore._kernels.voxels import EMPTY, slot_of
+
+
+@njit(cache=True, nogil=True)
+def place_on_axis(axis, chainage):
+    """The point of an axis at a chainage."""
+    bend = axis[12]
+    if bend == 0.0:
+        return (
+            axis[0] + chainage * axis[3],
+            axis[1] + chainage * axis[4],
+            axis[2] + chainage * axis[5],
+        )
+    cos, sin = bend * math.cos(chainage / bend), bend * math.sin(chainage / bend)
+    return (
+        axis[0] + cos * axis[6] + sin * axis[9],
+        axis[1] + cos * axis[7] + sin * axis[10],
+        axis[2] + cos * axis[8] + sin * axis[11],
+    )
+
+
+@njit(cache=True, nogil=True)
+def appended(items, n, item):
+    """A list with room: `items` with `item` at n, in an array twice as long where it is full."""
+    if n == items.shape[0]:
+        longer = np.empty(2 * n, items.dtype)
+        longer[:n] = items
+        items = longer
+    items[n] = item
+    return items
+
+
+@njit(cache=True, nogil=True)
+def cells_around(low, edge, n_y, n_z, table_keys, table_ids, axis, inner, outer, margin):
+    """Ids of the cells that may hold points between two distances from an axis.
+
+    The axis is walked in steps; each cell is taken at the step that is nearest to it.
+    """
+    mask = np.int64(table_keys.shape[0] - 1)
+    half_cell = 0.5 * math.sqrt(3.0) * edge
+    length = axis[16] + 2.0 * margin
+    n_steps = max(1, math.ceil(length / max(1.5 * outer, 2.0 * edge)))
+    step = length / n_steps
+    reach = outer + 0.5 * step + half_cell
+    cells = np.empty(256, np.int64)
+    n = 0
+    for k in range(n_steps):
+        px, py, pz = place_on_axis(axis, (k + 0.5) * step - margin)
+        ix0 = math.floor((px - reach - low[0]) / edge)
+        ix1 = math.floor((px + reach - low[0]) / edge)
+        iy0 = max(math.floor((py - reach - low[1]) / edge), 0)
+        iy1 = min(math.floor((py + reach - low[1]) / edge), n_y - 1)
+        iz0 = max(math.floor((pz - reach - low[2]) / edge), 0)
+        iz1 = min(math.floor((pz + reach - low[2]) / edge), n_z - 1)
+        for ix in range(max(ix0, 0), ix1 + 1):
+            x = low[0] + (ix + 0.5) * edge
+            for iy in range(iy0, iy1 + 1):
+                y = low[1] + (iy + 0.5) * edge
+                for iz in range(iz0, iz1 + 1):
+                    z = low[2] + (iz + 0.5) * edge
+                    chainage, up, right = across_axis(axis, x, y, z)
+                    rho = math.sqrt(up * up + right * right)
+                    if rho > outer + half_cell or rho < inner - half_cell:
+                        continue
+                    nearest = math.floor((chainage + margin) / step)
+                    if min(max(nearest, 0), n_steps - 1) != k:
+                        continue
+                    slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
+                    if table_keys[slot] != EMPTY:
+                        cells = appended(cells, n, np.int64(table_ids[slot]))
+                        n += 1
+    return cells[:n]
+
+
+@njit(cache=True, nogil=True)
+def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
+    """Points of some cells between two distances from an axis and not beyond its ends."""
+    n_most = 0
+    for c in cells:
+        n_most += starts[c + 1] - starts[c]
+    found = np.empty(n_most, np.int64)
+    n = 0
+    for c in cells:
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            chainage, up, right = across_axis(axis, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+            rho2 = up * up + right * right
+            if (
+                inner * inner < rho2 < outer * outer
+                and -margin < chainage < axis[16] + margin
+            ):  # fmt: skip
+                found[n] = i
+                n += 1
+    return np.sort(found[:n])
+
+
+@njit(cache=True, nogil=True)
+def points_in_ball(low, edge, n_y, n_z, table_keys, table_ids, xyz, members, starts, place, radius):
+    """Points within `radius` of a place, in order."""
+    px, py, pz = place[0], place[1], place[2]
+    mask = np.int64(table_keys.shape[0] - 1)
+    found = np.empty(256, np.int64)
+    n = 0
+    ix0 = max(math.floor((px - radius - low[0]) / edge), 0)
+    ix1 = math.floor((px + radius - low[0]) / edge)
+    iy0 = max(math.floor((py - radius - low[1]) / edge), 0)
+    iy1 = min(math.floor((py + radius - low[1]) / edge), n_y - 1)
+    iz0 = max(math.floor((pz - radius - low[2]) / edge), 0)
+    iz1 = min(math.floor((pz + radius - low[2]) / edge), n_z - 1)
+    for ix in range(ix0, ix1 + 1):
+        for iy in range(iy0, iy1 + 1):
+            for iz in range(iz0, iz1 + 1):
+                slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
+                if table_keys[slot] == EMPTY:
+                    continue
+                c = table_ids[slot]
+                for m in range(starts[c], starts[c + 1]):
+                    i = members[m]
+                    x, y, z = xyz[i, 0] - px, xyz[i, 1] - py, xyz[i, 2] - pz
+                    if x * x + y * y + z * z <= radius * radius:
+                        found = appended(found, n, i)
+                        n += 1
+    return np.sort(found[:n])
+
+
+@njit(cache=True, nogil=True)
+def points_on(
+    xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
+    kind, surface, band, depth, min_cos,
+):  # fmt: skip
+    """Free points of some cells that lie on a surface about an axis, and what lies inside it.
+
+    Points count whose normals are like the surface's own (cosine above `min_cos`), between
+    two distances from the axis: those within `band` of the surface are on it, those deeper
+    than `depth` inside. Of the former returns, in the order of their indices, the indices and
+    (n, 4): distance, chainage, clock, and the angle from the surface's normal to the point's
+    own towards increasing clock. Of the latter chainage and clock (m, 2).
+    """
+    n_most = 0
+    for c in cells:
+        n_most += starts[c + 1] - starts[c]
+    found, table = np.empty(n_most, np.int64), np.empty((n_most, 4))
+    inside = np.empty((n_most, 2))
+    row = np.empty(MOST_PARAMETERS)
+    n = n_inside = 0
+    for c in cells:
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+            chainage, up, right = across_axis(axis, x, y, z)
+            rho, clock = polar(up, right)
+            if not (inner < rho < outer and -margin < chainage < axis[16] + margin):
+                continue
+            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
+            cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
+            if not abs(cosine) > min_cos:
+                continue
+            if residual < -depth:
+                inside[n_inside, 0], inside[n_inside, 1] = chainage, clock
+                n_inside += 1
+            if is_free[i] and abs(residual) < band:
+                tx, ty, tz = tangent(axis, chainage)
+                ahead = (
+                    normals[i, 0] * (ty * oz - tz * oy)
+                    + normals[i, 1] * (tz * ox - tx * oz)
+                    + normals[i, 2] * (tx * oy - ty * ox)
+                )
+                found[n] = i
+                table[n, 0], table[n, 1], table[n, 2] = residual, chainage, clock
+                table[n, 3] = math.atan(ahead / cosine)
+                n += 1
+    order = np.argsort(found[:n])
+    return found[:n][order], table[:n][order], inside[:n_inside]
+
+
+@njit(cache=True, nogil=True)
+def tangent(axis, chainage):
+    """Unit tangent of an axis towards increasing chainage."""
+    bend = axis[12]
+    if bend == 0.0:
+        return axis[3], axis[4], axis[5]
+    cos, sin = math.cos(chainage / bend), math.sin(chainage / bend)
+    # The normal of the arc times outward.
+    return (
+        cos * axis[9] - sin * axis[6],
+        cos * axis[10] - sin * axis[7],
+        cos * axis[11] - sin * axis[8],
+    )
+
+
+@njit(cache=True, nogil=True)
+def behind(members, starts, chosen, xyz, index, places):
+    """Write the points behind chosen thinned points, each one's in the order of their places."""
+    n = 0
+    for c in chosen:
+        first = n
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            x, y, z = np.float64(xyz[i, 0]), np.float64(xyz[i, 1]), np.float64(xyz[i, 2])
+            k = n
+            while k > first and (
+                places[k - 1, 0] > x
+                or (places[k - 1, 0] == x and places[k - 1, 1] > y)
+                or (places[k - 1, 0] == x and places[k - 1, 1] == y and places[k - 1, 2] > z)
+            ):
+                index[k] = index[k - 1]
+                for a in range(3):
+                    places[k, a] = places[k - 1, a]
+                k -= 1
+            index[k] = i
+            places[k, 0], places[k, 1], places[k, 2] = x, y, z
+            n += 1
