@@ -138,6 +138,51 @@ def points_in_ball(low, edge, n_y, n_z, table_keys, table_ids, xyz, members, sta
 
 
 @njit(cache=True, nogil=True)
+def points_on_sphere(
+    low, edge, n_y, n_z, table_keys, table_ids, xyz, normals, is_free, members, starts,
+    centre, inner, outer, min_cos,
+):  # fmt: skip
+    """Free points between two distances from a place whose normals point to it, in order."""
+    mask = np.int64(table_keys.shape[0] - 1)
+    half_cell = 0.5 * math.sqrt(3.0) * edge
+    found = np.empty(256, np.int64)
+    n = 0
+    px, py, pz = centre[0], centre[1], centre[2]
+    iy0 = max(math.floor((py - outer - low[1]) / edge), 0)
+    iy1 = min(math.floor((py + outer - low[1]) / edge), n_y - 1)
+    iz0 = max(math.floor((pz - outer - low[2]) / edge), 0)
+    iz1 = min(math.floor((pz + outer - low[2]) / edge), n_z - 1)
+    ix0 = max(math.floor((px - outer - low[0]) / edge), 0)
+    ix1 = math.floor((px + outer - low[0]) / edge)
+    for ix in range(ix0, ix1 + 1):
+        x = low[0] + (ix + 0.5) * edge - px
+        for iy in range(iy0, iy1 + 1):
+            y = low[1] + (iy + 0.5) * edge - py
+            for iz in range(iz0, iz1 + 1):
+                z = low[2] + (iz + 0.5) * edge - pz
+                rho = math.sqrt(x * x + y * y + z * z)
+                if rho > outer + half_cell or rho < inner - half_cell:
+                    continue
+                slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
+                if table_keys[slot] == EMPTY:
+                    continue
+                c = table_ids[slot]
+                for m in range(starts[c], starts[c + 1]):
+                    i = members[m]
+                    if not is_free[i]:
+                        continue
+                    u, v, w = xyz[i, 0] - px, xyz[i, 1] - py, xyz[i, 2] - pz
+                    rho = math.sqrt(u * u + v * v + w * w)
+                    if not inner < rho < outer:
+                        continue
+                    cosine = (normals[i, 0] * u + normals[i, 1] * v + normals[i, 2] * w) / rho
+                    if abs(cosine) > min_cos:
+                        found = appended(found, n, i)
+                        n += 1
+    return np.sort(found[:n])
+
+
+@njit(cache=True, nogil=True)
 def points_on(
     xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
     kind, surface, band, depth, min_cos,

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import extent as kernels
+
 Array = NDArray[np.float64]
 
 MAX_GAP = 4.0
@@ -94,9 +96,8 @@ def find_extent(
     n_rows = int(row.max()) + 1
     # A sector is wide enough to hold a point wherever the surface is seen.
     n_sectors = int(np.clip(2 * np.pi * radius / (2.0 * spacing), 12, MAX_SECTORS))
-    sector = (clock / (2 * np.pi) * n_sectors).astype(np.intp) % n_sectors
-    seen = np.zeros((n_rows, n_sectors), np.bool_)
-    seen[row, sector] = True
+    seen = np.empty((n_rows, n_sectors), np.bool_)
+    kernels.mark_sectors(row, clock, seen)
     arc = seen.sum(axis=1) * (2 * np.pi / n_sectors)
     middle = base + (np.arange(n_rows) + 0.5) * step
     is_core = (middle > 0) & (middle < length)
@@ -136,37 +137,23 @@ def _seen_by_row(
 ) -> NDArray[np.int_]:
     """Whether each sector of each row holds a point, 0 or 1, shape (n_rows, sectors)."""
     row = np.floor((chainage - base) / step).astype(np.intp)
-    there = (row >= 0) & (row < n_rows)
-    seen = np.zeros((n_rows, MAX_SECTORS), np.int_)
-    sector = (clock[there] / (2 * np.pi) * MAX_SECTORS).astype(np.intp) % MAX_SECTORS
-    seen[row[there], sector] = 1
-    return seen
+    seen = np.empty((n_rows, MAX_SECTORS), np.bool_)
+    kernels.mark_sectors(row, clock, seen)
+    return seen.astype(np.int_)
 
 
 def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int) -> Array:
     """How much the normals of each row turn with the clock: 1 on a pipe, 0 on a plane."""
-
-    def total(values: Array) -> Array:
-        return np.bincount(row, values, minlength=n_rows).astype(np.float64)
-
-    middle = np.arctan2(total(np.sin(clock)), total(np.cos(clock)))
-    around = np.mod(clock - middle[row] + np.pi, 2 * np.pi) - np.pi
-    with np.errstate(invalid="ignore", divide="ignore"):
-        n = np.bincount(row, minlength=n_rows)
-        x = around - (total(around) / n)[row]
-        slope = total(x * (lean - (total(lean) / n)[row])) / total(x * x)
-    return np.nan_to_num(1.0 + slope)
+    turning = np.empty(n_rows)
+    kernels.turn_of_normals(clock, lean, row, turning)
+    return turning
 
 
 def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:
     """Median of the values of each row; infinite where there are none."""
-    order = np.lexsort((values, row))
-    counts = np.bincount(row, minlength=n_rows)
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    median = np.full(n_rows, np.inf)
-    used = counts > 0
-    median[used] = values[order][starts[used] + counts[used] // 2]
-    return median
+    medians = np.empty(n_rows)
+    kernels.upper_medians(values, row, medians)
+    return medians
 
 
 def sphere_misfit(outward: Array, residual: Array) -> float:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pipecore._kernels import nearby as kernels
 from pipecore._kernels import voxels
 from pipecore._kernels.grouping import group_by_label
-from pipecore.elements.surfaces import SurfaceModel
+from pipecore.elements.surfaces import SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.surface import Surface
 from pipecore.surface.grid import cell_numbers, empty_table
@@ -19,6 +19,8 @@ Indices = NDArray[np.intp]
 
 INNER, OUTER = 0.4, 1.3
 """The neighbourhood of an axis, in radii: deep dents inside, what touches outside."""
+REACH_OF_SPHERE = 1.2
+"""The same of a sphere."""
 CELL_VOXELS = 6.0
 """Edge of the cells in which thinned points are looked up, in voxels."""
 
@@ -127,6 +129,18 @@ class NearbyPoints:
         )  # fmt: skip
         residual, chainage, clock, lean = np.ascontiguousarray(table.T)
         return PointsOn(own, residual, chainage, clock, lean, (inside[:, 0], inside[:, 1]))
+
+    def on_sphere(
+        self, model: SphereSurface, is_free: NDArray[np.bool_], *, band: float, min_cos: float
+    ) -> Indices:
+        """Free thinned points within `band` of a sphere whose normals are like its own."""
+        outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
+        return np.asarray(
+            kernels.points_on_sphere(
+                *self._grid, self.surface.xyz, self.surface.normals, is_free, *self._cells,
+                model.centre, model.radius - band, outer, min_cos,
+            )
+        )  # fmt: skip
 
     def usual_spacing(self, thinned: Indices) -> float:
         """Distance between neighbours among some thinned points, not below the thinning's."""

@@ -250,8 +250,7 @@ def _refine_sphere(
         is_final = round_ == N_ROUNDS - 1
         if is_final and not (fitted and is_promising(fitted)):
             return None
-        ball = nearby.within_ball(model.centre, 1.2 * model.radius)
-        own = _on_sphere(model, ball[is_free[ball]], nearby, sigma)
+        own = nearby.on_sphere(model, is_free, band=_band(sigma), min_cos=RADIAL_COS)
         fit = _fit_to(model, own, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
@@ -259,16 +258,6 @@ def _refine_sphere(
         sigma = max(fit.sigma, 0.0005)
         fitted = _fitted_sphere(fit, own, nearby)
     return fitted
-
-
-def _on_sphere(
-    model: SphereSurface, thinned: Indices, nearby: NearbyPoints, sigma: float
-) -> Indices:
-    """Thinned points near a sphere with normals like its own."""
-    residual, _, outward = model.residuals(nearby.surface.xyz[thinned])
-    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
-    on = (cosine > RADIAL_COS) & (np.abs(residual) < _band(sigma))
-    return np.asarray(thinned[on])
 
 
 def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:

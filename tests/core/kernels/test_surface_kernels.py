@@ -231,3 +231,17 @@ def test_that_points_behind_thinned_ones_are_in_the_order_of_their_places(rng):
     assert_array_equal(places, xyz[index])
     assert (places[::2, 0] < places[1::2, 0]).all()
     assert_array_equal(normals, np.repeat(points.surface.normals[chosen], 2, axis=0))
+
+
+def test_that_points_on_a_sphere_face_its_centre(rng):
+    points, _, _ = cloud_around(rng, axes_of(rng)[0])
+    model = SphereSurface(points.surface.xyz.mean(axis=0), 0.2)
+    is_free = rng.random(len(points.surface.xyz)) < 0.7
+    residual, _, outward = model.residuals(points.surface.xyz)
+    cosine = np.abs(np.einsum("ij,ij->i", points.surface.normals, outward))
+    for band, outer in ((0.03, 0.03), (0.1, 0.04)):
+        # No further out than a fifth of the radius.
+        on = (cosine > 0.5) & is_free & (residual > -band) & (residual < outer)
+        assert on.any()
+        found = points.on_sphere(model, is_free, band=band, min_cos=0.5)
+        assert_array_equal(found, np.flatnonzero(on))
