@@ -1,8 +1,9 @@
-"""Points around an axis or a place, from a hashed grid of cells.
+"""Points around an axis or a place, from cells of two sizes.
 
-A grid is its lower corner and edge, the numbers of cells along y and z, a hash table from
-the numbers of cells to their ids, and the points of each cell: `members` from `starts[id]`
-to `starts[id + 1]`.
+A grid is the lower corner and the edge of its coarse cells, their numbers along y and z, a hash
+table from the numbers of coarse cells to their ids, and the fine cells within each coarse one:
+those from `cell_starts[id]` to `cell_starts[id + 1]`, with their middles and half a diagonal.
+A fine cell's points are `members` from `starts[cell]` to `starts[cell + 1]`.
 """
 
 import math
@@ -45,43 +46,102 @@ def appended(items, n, item):
 
 
 @njit(cache=True, nogil=True)
-def cells_around(low, edge, n_y, n_z, table_keys, table_ids, axis, inner, outer, margin):
-    """Ids of the cells that may hold points between two distances from an axis.
+def distance_from_axis(axis, x, y, z):
+    """Distance of a point from a line or a full circle."""
+    px, py, pz = x - axis[0], y - axis[1], z - axis[2]
+    along = px * axis[3] + py * axis[4] + pz * axis[5]
+    across = math.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
+    if axis[12] == 0.0:
+        return across
+    beyond = across - axis[12]
+    return math.sqrt(beyond * beyond + along * along)
 
-    The axis is walked in steps; each cell is taken at the step that is nearest to it.
+
+@njit(cache=True, nogil=True)
+def cells_around(
+    low, edge, n_y, n_z, table_keys, table_ids, cell_starts, middles, half_cell,
+    axis, inner, outer, margin,
+):  # fmt: skip
+    """Fine cells that may hold points between two distances from an axis.
+
+    The axis is walked in steps; each coarse cell is taken at the step that is nearest to it.
     """
     mask = np.int64(table_keys.shape[0] - 1)
-    half_cell = 0.5 * math.sqrt(3.0) * edge
+    half_coarse = 0.5 * math.sqrt(3.0) * edge
     length = axis[16] + 2.0 * margin
     n_steps = max(1, math.ceil(length / max(1.5 * outer, 2.0 * edge)))
     step = length / n_steps
-    reach = outer + 0.5 * step + half_cell
+    reach = outer + 0.5 * step + half_coarse
     cells = np.empty(256, np.int64)
     n = 0
     for k in range(n_steps):
         px, py, pz = place_on_axis(axis, (k + 0.5) * step - margin)
-        ix0 = math.floor((px - reach - low[0]) / edge)
+        ix0 = max(math.floor((px - reach - low[0]) / edge), 0)
         ix1 = math.floor((px + reach - low[0]) / edge)
         iy0 = max(math.floor((py - reach - low[1]) / edge), 0)
         iy1 = min(math.floor((py + reach - low[1]) / edge), n_y - 1)
         iz0 = max(math.floor((pz - reach - low[2]) / edge), 0)
         iz1 = min(math.floor((pz + reach - low[2]) / edge), n_z - 1)
-        for ix in range(max(ix0, 0), ix1 + 1):
+        for ix in range(ix0, ix1 + 1):
             x = low[0] + (ix + 0.5) * edge
             for iy in range(iy0, iy1 + 1):
                 y = low[1] + (iy + 0.5) * edge
                 for iz in range(iz0, iz1 + 1):
                     z = low[2] + (iz + 0.5) * edge
-                    chainage, up, right = across_axis(axis, x, y, z)
-                    rho = math.sqrt(up * up + right * right)
-                    if rho > outer + half_cell or rho < inner - half_cell:
+                    rho = distance_from_axis(axis, x, y, z)
+                    if rho > outer + half_coarse or rho < inner - half_coarse:
                         continue
+                    slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
+                    if table_keys[slot] == EMPTY:
+                        continue
+                    chainage, _, _ = across_axis(axis, x, y, z)
                     nearest = math.floor((chainage + margin) / step)
                     if min(max(nearest, 0), n_steps - 1) != k:
                         continue
-                    slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
-                    if table_keys[slot] != EMPTY:
-                        cells = appended(cells, n, np.int64(table_ids[slot]))
+                    c = table_ids[slot]
+                    for m in range(cell_starts[c], cell_starts[c + 1]):
+                        rho = distance_from_axis(axis, middles[m, 0], middles[m, 1], middles[m, 2])
+                        if inner - half_cell <= rho <= outer + half_cell:
+                            cells = appended(cells, n, np.int64(m))
+                            n += 1
+    return cells[:n]
+
+
+@njit(cache=True, nogil=True)
+def cells_in_shell(
+    low, edge, n_y, n_z, table_keys, table_ids, cell_starts, middles, half_cell,
+    place, inner, outer,
+):  # fmt: skip
+    """Fine cells that may hold points between two distances from a place."""
+    mask = np.int64(table_keys.shape[0] - 1)
+    half_coarse = 0.5 * math.sqrt(3.0) * edge
+    px, py, pz = place[0], place[1], place[2]
+    cells = np.empty(256, np.int64)
+    n = 0
+    ix0 = max(math.floor((px - outer - low[0]) / edge), 0)
+    ix1 = math.floor((px + outer - low[0]) / edge)
+    iy0 = max(math.floor((py - outer - low[1]) / edge), 0)
+    iy1 = min(math.floor((py + outer - low[1]) / edge), n_y - 1)
+    iz0 = max(math.floor((pz - outer - low[2]) / edge), 0)
+    iz1 = min(math.floor((pz + outer - low[2]) / edge), n_z - 1)
+    for ix in range(ix0, ix1 + 1):
+        x = low[0] + (ix + 0.5) * edge - px
+        for iy in range(iy0, iy1 + 1):
+            y = low[1] + (iy + 0.5) * edge - py
+            for iz in range(iz0, iz1 + 1):
+                z = low[2] + (iz + 0.5) * edge - pz
+                rho = math.sqrt(x * x + y * y + z * z)
+                if rho > outer + half_coarse or rho < inner - half_coarse:
+                    continue
+                slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
+                if table_keys[slot] == EMPTY:
+                    continue
+                c = table_ids[slot]
+                for m in range(cell_starts[c], cell_starts[c + 1]):
+                    u, v, w = middles[m, 0] - px, middles[m, 1] - py, middles[m, 2] - pz
+                    rho = math.sqrt(u * u + v * v + w * w)
+                    if inner - half_cell <= rho <= outer + half_cell:
+                        cells = appended(cells, n, np.int64(m))
                         n += 1
     return cells[:n]
 
@@ -109,76 +169,38 @@ def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
 
 
 @njit(cache=True, nogil=True)
-def points_in_ball(low, edge, n_y, n_z, table_keys, table_ids, xyz, members, starts, place, radius):
-    """Points within `radius` of a place, in order."""
-    px, py, pz = place[0], place[1], place[2]
-    mask = np.int64(table_keys.shape[0] - 1)
+def points_in_ball(xyz, members, starts, cells, place, radius):
+    """Points of some cells within `radius` of a place, in order."""
     found = np.empty(256, np.int64)
     n = 0
-    ix0 = max(math.floor((px - radius - low[0]) / edge), 0)
-    ix1 = math.floor((px + radius - low[0]) / edge)
-    iy0 = max(math.floor((py - radius - low[1]) / edge), 0)
-    iy1 = min(math.floor((py + radius - low[1]) / edge), n_y - 1)
-    iz0 = max(math.floor((pz - radius - low[2]) / edge), 0)
-    iz1 = min(math.floor((pz + radius - low[2]) / edge), n_z - 1)
-    for ix in range(ix0, ix1 + 1):
-        for iy in range(iy0, iy1 + 1):
-            for iz in range(iz0, iz1 + 1):
-                slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
-                if table_keys[slot] == EMPTY:
-                    continue
-                c = table_ids[slot]
-                for m in range(starts[c], starts[c + 1]):
-                    i = members[m]
-                    x, y, z = xyz[i, 0] - px, xyz[i, 1] - py, xyz[i, 2] - pz
-                    if x * x + y * y + z * z <= radius * radius:
-                        found = appended(found, n, i)
-                        n += 1
+    for c in cells:
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            x, y, z = xyz[i, 0] - place[0], xyz[i, 1] - place[1], xyz[i, 2] - place[2]
+            if x * x + y * y + z * z <= radius * radius:
+                found = appended(found, n, i)
+                n += 1
     return np.sort(found[:n])
 
 
 @njit(cache=True, nogil=True)
-def points_on_sphere(
-    low, edge, n_y, n_z, table_keys, table_ids, xyz, normals, is_free, members, starts,
-    centre, inner, outer, min_cos,
-):  # fmt: skip
-    """Free points between two distances from a place whose normals point to it, in order."""
-    mask = np.int64(table_keys.shape[0] - 1)
-    half_cell = 0.5 * math.sqrt(3.0) * edge
+def points_on_sphere(xyz, normals, is_free, members, starts, cells, centre, inner, outer, min_cos):
+    """Free points of some cells between two distances from a place whose normals point to it."""
     found = np.empty(256, np.int64)
     n = 0
-    px, py, pz = centre[0], centre[1], centre[2]
-    iy0 = max(math.floor((py - outer - low[1]) / edge), 0)
-    iy1 = min(math.floor((py + outer - low[1]) / edge), n_y - 1)
-    iz0 = max(math.floor((pz - outer - low[2]) / edge), 0)
-    iz1 = min(math.floor((pz + outer - low[2]) / edge), n_z - 1)
-    ix0 = max(math.floor((px - outer - low[0]) / edge), 0)
-    ix1 = math.floor((px + outer - low[0]) / edge)
-    for ix in range(ix0, ix1 + 1):
-        x = low[0] + (ix + 0.5) * edge - px
-        for iy in range(iy0, iy1 + 1):
-            y = low[1] + (iy + 0.5) * edge - py
-            for iz in range(iz0, iz1 + 1):
-                z = low[2] + (iz + 0.5) * edge - pz
-                rho = math.sqrt(x * x + y * y + z * z)
-                if rho > outer + half_cell or rho < inner - half_cell:
-                    continue
-                slot = slot_of((ix * n_y + iy) * n_z + iz, table_keys, mask)
-                if table_keys[slot] == EMPTY:
-                    continue
-                c = table_ids[slot]
-                for m in range(starts[c], starts[c + 1]):
-                    i = members[m]
-                    if not is_free[i]:
-                        continue
-                    u, v, w = xyz[i, 0] - px, xyz[i, 1] - py, xyz[i, 2] - pz
-                    rho = math.sqrt(u * u + v * v + w * w)
-                    if not inner < rho < outer:
-                        continue
-                    cosine = (normals[i, 0] * u + normals[i, 1] * v + normals[i, 2] * w) / rho
-                    if abs(cosine) > min_cos:
-                        found = appended(found, n, i)
-                        n += 1
+    for c in cells:
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            if not is_free[i]:
+                continue
+            x, y, z = xyz[i, 0] - centre[0], xyz[i, 1] - centre[1], xyz[i, 2] - centre[2]
+            rho = math.sqrt(x * x + y * y + z * z)
+            if not inner < rho < outer:
+                continue
+            cosine = (normals[i, 0] * x + normals[i, 1] * y + normals[i, 2] * z) / rho
+            if abs(cosine) > min_cos:
+                found = appended(found, n, i)
+                n += 1
     return np.sort(found[:n])
 
 
@@ -206,18 +228,19 @@ def points_on(
         for m in range(starts[c], starts[c + 1]):
             i = members[m]
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
+            cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
+            is_on = is_free[i] and abs(residual) < band
+            if not abs(cosine) > min_cos or not (is_on or residual < -depth):
+                continue
             chainage, up, right = across_axis(axis, x, y, z)
             rho, clock = polar(up, right)
             if not (inner < rho < outer and -margin < chainage < axis[16] + margin):
                 continue
-            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
-            cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
-            if not abs(cosine) > min_cos:
-                continue
             if residual < -depth:
                 inside[n_inside, 0], inside[n_inside, 1] = chainage, clock
                 n_inside += 1
-            if is_free[i] and abs(residual) < band:
+            if is_on:
                 tx, ty, tz = tangent(axis, chainage)
                 ahead = (
                     normals[i, 0] * (ty * oz - tz * oy)

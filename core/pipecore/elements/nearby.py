@@ -21,8 +21,8 @@ INNER, OUTER = 0.4, 1.3
 """The neighbourhood of an axis, in radii: deep dents inside, what touches outside."""
 REACH_OF_SPHERE = 1.2
 """The same of a sphere."""
-CELL_VOXELS = 6.0
-"""Edge of the cells in which thinned points are looked up, in voxels."""
+CELL_VOXELS, COARSE = 6.0, 4
+"""Edge of the cells in which thinned points are looked up, in voxels; coarse ones in fine ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,27 +49,27 @@ class PointsOn:
 
 def _numbered_cells(
     keys: NDArray[np.int64],
-) -> tuple[NDArray[np.int32], int, tuple[NDArray[np.int64], NDArray[np.int32]]]:
-    """Ids of the cells of points, how many there are, and the table from cells to ids.
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Ids of the cells of points, and the cells' numbers.
 
     The table grows with the cells, which are far fewer than the points.
     """
     chunk = 1 << 17
-    room = 2 * chunk
-    table_keys, table_ids = empty_table(room)
+    known = np.empty(0, np.int64)
     ids = np.empty(len(keys), np.int32)
-    n_cells = 0
+    table = empty_table(0)
     for start in range(0, len(keys), chunk):
-        if n_cells + chunk > room:
-            room *= 2
-            used = table_keys != voxels.EMPTY
-            known = np.empty(n_cells, np.int64)
-            known[table_ids[used]] = table_keys[used]
-            table_keys, table_ids = empty_table(room)
-            voxels.fill_table(known, table_keys, table_ids)
         part = slice(start, start + chunk)
-        n_cells = voxels.number_voxels(keys[part], table_keys, table_ids, ids[part], n_cells)
-    return ids, n_cells, (table_keys, table_ids)
+        if 2 * (len(known) + chunk) > len(table[0]):
+            table = empty_table(2 * (len(known) + chunk))
+            voxels.fill_table(known, *table)
+        n_cells = voxels.number_voxels(keys[part], *table, ids[part], len(known))
+        is_new = ids[part] >= len(known)
+        longer = np.empty(n_cells, np.int64)
+        longer[: len(known)] = known
+        longer[ids[part][is_new]] = keys[part][is_new]
+        known = longer
+    return ids, known
 
 
 class NearbyPoints:
@@ -80,10 +80,23 @@ class NearbyPoints:
         self.surface = surface
         self._members, self._starts = group_by_label(surface.parent, len(surface.xyz))
         edge = CELL_VOXELS * surface.voxel
-        keys, low, n_y, n_z = cell_numbers(surface.xyz, edge)
-        cell, n_cells, (table_keys, table_ids) = _numbered_cells(keys)
-        self._grid = low, edge, n_y, n_z, table_keys, table_ids
-        self._cells: tuple[Indices, Indices] = group_by_label(cell, n_cells)
+        keys, first, n_y, n_z = cell_numbers(surface.xyz, edge)
+        cell, numbers = _numbered_cells(keys)
+        place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
+        coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
+        x, y, z = (place // COARSE).T
+        coarse, coarse_numbers = _numbered_cells((x * coarse_y + y) * coarse_z + z)
+        table = empty_table(len(coarse_numbers))
+        voxels.fill_table(coarse_numbers, *table)
+        order, cell_starts = group_by_label(coarse, len(coarse_numbers))
+        middles = (first + place[order] + 0.5) * edge
+        self._grid = (
+            first * edge, COARSE * edge, coarse_y, coarse_z, *table, cell_starts, middles,
+            0.5 * np.sqrt(3.0) * edge + 1e-6,
+        )  # fmt: skip
+        rank = np.empty(len(order), np.int32)
+        rank[order] = np.arange(len(order), dtype=np.int32)
+        self._cells: tuple[Indices, Indices] = group_by_label(rank[cell], len(order))
 
     def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
@@ -135,10 +148,12 @@ class NearbyPoints:
     ) -> Indices:
         """Free thinned points within `band` of a sphere whose normals are like its own."""
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
+        inner = model.radius - band
+        cells = kernels.cells_in_shell(*self._grid, model.centre, inner, outer)
         return np.asarray(
             kernels.points_on_sphere(
-                *self._grid, self.surface.xyz, self.surface.normals, is_free, *self._cells,
-                model.centre, model.radius - band, outer, min_cos,
+                self.surface.xyz, self.surface.normals, is_free, *self._cells, cells,
+                model.centre, inner, outer, min_cos,
             )
         )  # fmt: skip
 
@@ -150,8 +165,9 @@ class NearbyPoints:
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
         """Thinned points within `radius` of a place, in order."""
+        cells = kernels.cells_in_shell(*self._grid, centre, 0.0, radius)
         return np.asarray(
-            kernels.points_in_ball(*self._grid, self.surface.xyz, *self._cells, centre, radius)
+            kernels.points_in_ball(self.surface.xyz, *self._cells, cells, centre, radius)
         )
 
     def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:

@@ -129,9 +129,10 @@ def refine_piece(
             band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
         )  # fmt: skip
         chainage, clock = near.chainage, near.clock
+        spacing = nearby.usual_spacing(near.own)
         extent = find_extent(
             chainage, clock, near.residual, near.lean, near.inside,
-            axis.length, model.radius, nearby.usual_spacing(near.own), sigma,
+            axis.length, model.radius, spacing, sigma,
         )  # fmt: skip
         if extent is None:
             return None
