@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 
 from pipegui import theme
 from pipegui.command_search import Entry
+from pipegui.document import Background
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class ActionSpec:
     shortcut: str = ""
     needs: str = ""
     is_checkable: bool = False
+    submenu: str = ""
+    """Title of the menu within the menu in which it stands."""
 
 
 _A = ActionSpec
@@ -33,6 +36,12 @@ _SEPARATOR = None
 
 def _option(name: str, text: str, tip: str, shortcut: str = "") -> ActionSpec:
     return ActionSpec(name, text, tip, "", shortcut, "scan", is_checkable=True)
+
+
+def _background(background: Background) -> ActionSpec:
+    name = f"background_{background.name.lower()}"
+    tip = "What lies behind the points"
+    return ActionSpec(name, str(background), tip, is_checkable=True, submenu="Background")
 
 
 MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
@@ -55,9 +64,13 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _A("fit", "Fit to view", "Show the whole scan", "fit-to-screen-outline", "F", "scan"),
         _SEPARATOR,
         _A("view_top", "From above", "Look down", "axis-z-arrow", "7", "scan"),
+        _A("view_bottom", "From below", "Look up", "", "Ctrl+7", "scan"),
         _A("view_front", "From the south", "Look along +Y", "axis-y-arrow", "1", "scan"),
+        _A("view_back", "From the north", "Look along −Y", "", "Ctrl+1", "scan"),
         _A("view_right", "From the east", "Look along −X", "axis-x-arrow", "3", "scan"),
+        _A("view_left", "From the west", "Look along +X", "", "Ctrl+3", "scan"),
         _A("view_iso", "From a corner", "Look from a corner", "axis-arrow", "0", "scan"),
+        _option("is_parallel", "Without perspective", "Equal lengths look equal everywhere", "5"),
         _SEPARATOR,
         _option("show_points", "Points", "Show the points", "P"),
         _option("show_axes", "Axes", "Show the axes of the elements", "A"),
@@ -65,6 +78,20 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _option("show_surfaces", "Fitted surfaces", "Show the fitted shapes, translucent", "S"),
         _option("show_labels", "Labels", "Name the deformations in the 3D view", "L"),
         _option("fly", "Fly to the selection", "Move the camera to what is selected"),
+        _SEPARATOR,
+        _A("larger_points", "Larger points", "Draw points larger", "", "+", "scan"),
+        _A("smaller_points", "Smaller points", "Draw points smaller", "", "-", "scan"),
+        _A("usual_points", "Usual point size", "Draw points as large as suits", "", "", "scan"),
+        _option("eye_dome", "Shade edges", "Darken steps in depth: shapes show without colour"),
+        _A(
+            "fit_limits",
+            "Fit limits",
+            "Deviation limits that hold 98 % of the points",
+            "",
+            "",
+            "result",
+        ),
+        *(_background(b) for b in Background),
         _SEPARATOR,
     ),
     "Cloud": (
@@ -145,7 +172,16 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     ),
 }
 
-VIEW_OPTIONS = ("show_points", "show_axes", "show_ellipses", "show_surfaces", "show_labels", "fly")
+VIEW_OPTIONS = (
+    "show_points",
+    "show_axes",
+    "show_ellipses",
+    "show_surfaces",
+    "show_labels",
+    "fly",
+    "is_parallel",
+    "eye_dome",
+)
 """Actions that switch the field of `ViewOptions` with their name."""
 
 SPECS = tuple(spec for menu in MENUS.values() for spec in menu if spec is not None)
@@ -170,8 +206,13 @@ class Actions:
                     action.toggled.connect(handler)
                 else:
                     action.triggered.connect(lambda _=False, handler=handler: handler())
-                menu.addAction(action)
+                (self._submenu(menu, spec.submenu) if spec.submenu else menu).addAction(action)
         self.refresh_icons()
+
+    def _submenu(self, menu: QMenu, title: str) -> QMenu:
+        if title not in self.menus:
+            self.menus[title] = menu.addMenu(title)
+        return self.menus[title]
 
     def __getitem__(self, name: str) -> QAction:
         return self._actions[name]

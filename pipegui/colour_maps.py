@@ -22,6 +22,17 @@ QUALITATIVE = np.array(
 """Colours that can be told apart; none is the accent of the selection."""
 
 
+KINDS = np.array(
+    [
+        [int(c[i : i + 2], 16) for i in (1, 3, 5)]
+        for c in ("#4477aa", "#228833", "#66ccee", "#ccbb44", "#ee6677", "#aa3377", "#6d7f8f")
+    ],
+    np.uint8,
+)
+"""Paul Tol's bright colours, which colour-blind people can tell apart, and a grey."""
+BLOCK = 1_000_000
+
+
 def rgb(hexadecimal: str) -> tuple[int, int, int]:
     """Return "#rrggbb" as three numbers from 0 to 255."""
     return tuple(int(hexadecimal[i : i + 2], 16) for i in (1, 3, 5))
@@ -43,10 +54,16 @@ INTENSITY = _table(_DARK_TO_BRIGHT)
 def look_up(table: Colours, share: ArrayLike, missing: ArrayLike = (0, 0, 0)) -> Colours:
     """Return the colours of `share` (0 … 1, clipped; nan is `missing`), shape (…, 3)."""
     share = np.asarray(share)
-    is_missing = ~np.isfinite(share)
-    index = np.clip(np.where(is_missing, 0, share), 0, 1) * (len(table) - 1)
-    colours = table[np.rint(index).astype(np.intp)]
-    colours[is_missing] = missing
+    colours = np.empty((*share.shape, 3), np.uint8)
+    # In blocks: what is in between takes ten times the room of the colours.
+    for start in range(0, max(len(share), 1) if share.ndim else 1, BLOCK):
+        at = slice(start, start + BLOCK) if share.ndim else ()
+        block = share[at]
+        is_missing = ~np.isfinite(block)
+        index = np.clip(np.where(is_missing, 0, block), 0, 1) * (len(table) - 1)
+        part = table[np.rint(index).astype(np.intp)]
+        part[is_missing] = missing
+        colours[at] = part
     return colours
 
 

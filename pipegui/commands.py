@@ -14,7 +14,15 @@ from pipecore.report.summary import by_verdict
 from pipecore.settings import DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
 from pipegui import selecting
-from pipegui.document import ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.document import (
+    ColourBy,
+    Document,
+    ProfileKey,
+    Scan,
+    Selection,
+    Tool,
+    ViewOptions,
+)
 
 Command = TypeVar("Command", bound=Callable[..., Document])
 
@@ -27,6 +35,7 @@ NEEDS_RESULT = {
     ColourBy.KIND,
     ColourBy.DEVIATION,
     ColourBy.PROFILE,
+    ColourBy.VERDICT,
 }
 
 
@@ -59,8 +68,17 @@ def close_scan(document: Document, index: int) -> Document:
 def activate_scan(document: Document, index: int) -> Document:
     """Look at another scan."""
     document = replace(document, active=index, selection=Selection())
-    view = replace(document.view, hidden_elements=frozenset(), shown_stack=NO_ID, clip_box=None)
-    view = replace(view, pinned_elements=())
+    view = replace(
+        document.view,
+        hidden_elements=frozenset(),
+        shown_stack=NO_ID,
+        shown_profile=None,
+        pinned_elements=(),
+        clip_box=None,
+        tool=Tool.SELECT,
+        measurements=(),
+        measuring_from=None,
+    )
     if document.scan is not None and view.colour_by not in colours_of(document.scan):
         view = replace(view, colour_by=colours_of(document.scan)[0])
     return replace(document, view=view)
@@ -139,7 +157,14 @@ def colours_of(scan: Scan) -> tuple[ColourBy, ...]:
         ColourBy.INTENSITY: scan.cloud.intensity is not None,
         ColourBy.HEIGHT: True,
     } | dict.fromkeys(
-        (ColourBy.DEVIATION, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.SEGMENT, ColourBy.PROFILE),
+        (
+            ColourBy.DEVIATION,
+            ColourBy.VERDICT,
+            ColourBy.ELEMENT,
+            ColourBy.KIND,
+            ColourBy.SEGMENT,
+            ColourBy.PROFILE,
+        ),
         scan.result is not None,
     )
     return tuple(colour for colour, there in has.items() if there)

@@ -23,6 +23,39 @@ class ColourBy(StrEnum):
     INTENSITY = "Intensity"
     RGB = "RGB"
     PROFILE = "Profiles of a stack"
+    VERDICT = "Verdict"
+
+
+class Background(StrEnum):
+    """What lies behind the points."""
+
+    SYSTEM = "As the system"
+    LIGHT = "Light"
+    DARK = "Dark"
+    WHITE = "White"
+    BLACK = "Black"
+
+
+class Tool(StrEnum):
+    """What a click into the 3D view does."""
+
+    SELECT = "Select"
+    MEASURE = "Measure"
+    COORDINATES = "Coordinates"
+
+
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One point whose coordinates were asked for, or two with the distance between them.
+
+    Local coordinates of the active scan, metres.
+    """
+
+    start: Point
+    end: Point | None = None
 
 
 @dataclass(frozen=True)
@@ -85,6 +118,19 @@ class ViewOptions:
     fly: bool = True
     clip_box: Box | None = None
     """Only what lies within is shown."""
+    shown_profile: int | None = None
+    """The one profile of `shown_stack` that is shown in colour; None: all."""
+    point_size: float = 1.0
+    """Times the size that suits the points' spacing."""
+    is_parallel: bool = False
+    """Whether the 3D view is drawn without perspective."""
+    eye_dome: bool | None = None
+    """Whether steps in depth are shaded; None: where the hardware draws that fast."""
+    background: Background = Background.SYSTEM
+    tool: Tool = Tool.SELECT
+    measurements: tuple[Measurement, ...] = ()
+    measuring_from: Point | None = None
+    """The first of two points, while the second is still to be picked."""
 
 
 @dataclass(frozen=True, eq=False)

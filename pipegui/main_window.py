@@ -13,7 +13,7 @@ from pipecore.report.summary import summarise
 from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
 from pipegui.actions import VIEW_OPTIONS, Actions
-from pipegui.document import Document, Scan
+from pipegui.document import Background, Document, Scan
 from pipegui.history import History
 from pipegui.jobs import Jobs
 from pipegui.layout import LAYOUT_VERSION, Panels, arrange
@@ -169,7 +169,12 @@ class MainWindow(QMainWindow):
         self.tool_bar.apply(state)
         self.status.apply(state)
         for name in VIEW_OPTIONS:
-            self.actions_.set_checked(name, getattr(state.view, name))
+            self.actions_.set_checked(name, bool(getattr(state.view, name)))
+        if state.view.eye_dome is None:
+            self.actions_.set_checked("eye_dome", self.parts.scene.shades_edges)
+        for background in Background:
+            chosen = background is state.view.background
+            self.actions_.set_checked(f"background_{background.name.lower()}", chosen)
 
     def _apply_properties(self, state: PropertiesState) -> None:
         self.panels.properties.apply(state)

@@ -65,9 +65,9 @@ def is_dark() -> bool:
     return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
 
 
-def colour(role: str) -> QColor:
-    """Return a colour of the current scheme by its role, such as "muted"."""
-    return QColor((_DARK if is_dark() else _LIGHT)[role])
+def colour(role: str, *, dark: bool | None = None) -> QColor:
+    """Return a colour by its role, such as "muted"; of the current scheme by default."""
+    return QColor((_DARK if (is_dark() if dark is None else dark) else _LIGHT)[role])
 
 
 def apply_theme(app: QApplication) -> None:

@@ -3,11 +3,15 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from pipegui import commands
+from pipegui import commands, view_commands
 from pipegui.actions import VIEW_OPTIONS
+from pipegui.document import Background
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
+
+
+STANDARD_VIEWS = ("top", "bottom", "front", "back", "right", "left", "iso")
 
 
 def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
@@ -38,11 +42,18 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "search_actions": menu.search_actions,
         "shortcuts": menu.show_shortcuts,
         "about": menu.show_about,
+        "fit_limits": lambda: do(view_commands.fit_limits),
     }
     for table in ("deformations", "elements", "profiles"):
         found[f"export_{table}"] = lambda table=table: menu.export_table(table)
-    for name in ("top", "front", "right", "iso"):
+    for name in STANDARD_VIEWS:
         found[f"view_{name}"] = lambda name=name: scene.set_standard_view(name)
+    for size in ("larger", "smaller", "usual"):
+        found[f"{size}_points"] = lambda size=size: do(view_commands.set_point_size, size)
+    for background in Background:
+        name = f"background_{background.name.lower()}"
+        # A click on the one that is chosen chooses it again.
+        found[name] = lambda _, b=background: do(commands.set_view, background=b)
     for name in VIEW_OPTIONS:
         found[name] = lambda on, name=name: do(commands.set_view, **{name: on})
     return found

@@ -9,6 +9,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
 from pyvistaqt.rwi import QVTKRenderWindowInteractor
 from vtkmodules.vtkRenderingCore import vtkCamera, vtkRenderer
+from vtkmodules.vtkRenderingOpenGL2 import vtkEDLShading, vtkRenderStepsPass
 
 from pipecore.geometry import Array
 from pipegui.scene import pose as poses
@@ -18,10 +19,18 @@ from pipegui.scene.projection import Projection, as_array
 FLIGHT_MS = 300
 REST_MS = 250
 """The camera counts as moving for so long after its last move."""
+REST_SECONDS = 0.35
+"""What drawing may take then: whoever moves on should not wait for it."""
+SETTLE_MS = 900
+SETTLED_SECONDS = 1.5
+"""What it may take once the camera has rested for some more time."""
 RADIANS_PER_PX = np.deg2rad(0.35)
 ZOOM_PER_STEP = 0.8
 CLOSER = 0.4
 N_LAYERS = 2
+
+SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "microsoft basic render")
+"""Names by which OpenGL without a graphics card is known, in small letters."""
 
 LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
 SHIFT = Qt.KeyboardModifier.ShiftModifier
@@ -49,6 +58,10 @@ class Canvas(QVTKRenderWindowInteractor):
         self.point_under: Callable[[QPointF], Array | None] = lambda _: None
         self.pose = Pose(np.zeros(3), 1.0)
         self.is_moving = False
+        self.is_parallel = False
+        self.eye_dome: bool | None = None
+        self._is_software: bool | None = None
+        self._shading: vtkEDLShading | None = None
         self._is_stale = True
         self._press: QPointF | None = None
         self._last: QPointF | None = None
@@ -67,6 +80,10 @@ class Canvas(QVTKRenderWindowInteractor):
         window.GetInteractor().Initialize()  # else it does not render
         self._resting = QTimer(self, singleShot=True, interval=REST_MS)
         self._resting.timeout.connect(self._rest)
+        self.seconds_to_draw = SETTLED_SECONDS
+        """What a picture may take now, 0 while the camera moves."""
+        self._settling = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._settling.timeout.connect(self._settle)
         self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
         self._flight.setEasingCurve(QEasingCurve.Type.InOutCubic)
         self._flight.valueChanged.connect(self._fly_on)
@@ -95,6 +112,7 @@ class Canvas(QVTKRenderWindowInteractor):
             return
         self._is_stale = False
         self._place_camera()
+        self._shade()
         self.before_frame.emit()
         start = time.perf_counter()
         super().paintGL()
@@ -106,16 +124,56 @@ class Canvas(QVTKRenderWindowInteractor):
         super().resizeGL(width, height)
         self._is_stale = True
 
+    @property
+    def is_drawn(self) -> bool:
+        """Whether there has been a picture, so that the hardware is known."""
+        return self._is_software is not None
+
+    @property
+    def is_software(self) -> bool:
+        """Whether there is no graphics card that draws; known once something was drawn."""
+        if self._is_software is None:
+            said = self.GetRenderWindow().ReportCapabilities().lower()
+            self._is_software = any(name in said for name in SOFTWARE)
+        return self._is_software
+
+    def _shade(self) -> None:
+        """Shade steps in depth where that is wanted, without a graphics card only at rest."""
+        is_wanted = not self.is_software if self.eye_dome is None else self.eye_dome
+        if is_wanted and self.is_moving and self.is_software:
+            is_wanted = False
+        if is_wanted == (self._shading is not None):
+            return
+        if is_wanted:
+            self._shading = vtkEDLShading()
+            self._shading.SetDelegatePass(vtkRenderStepsPass())
+        else:
+            self._shading.ReleaseGraphicsResources(self.GetRenderWindow())
+            self._shading = None
+        self.layers[0].SetPass(self._shading)
+
     def _place_camera(self) -> None:
         pose = self.pose
-        self._camera.SetFocalPoint(pose.focus)
-        self._camera.SetPosition(pose.position)
-        self._camera.SetViewUp(pose.up)
         bounds = np.array([layer.ComputeVisiblePropBounds() for layer in self.layers])
         bounds = bounds[bounds[:, 0] <= bounds[:, 1]]
+        low, high = bounds[:, ::2].min(axis=0, initial=0), bounds[:, 1::2].max(axis=0, initial=0)
+        position = pose.position
+        if self.is_parallel:
+            # How far away it is makes no difference, so nothing has to be behind it.
+            away = np.linalg.norm(high - low) + np.linalg.norm((low + high) / 2 - pose.focus)
+            position = pose.focus - (pose.distance + away) * pose.forward
+        self._camera.SetParallelProjection(self.is_parallel)
+        self._camera.SetParallelScale(self._parallel_scale)
+        self._camera.SetFocalPoint(pose.focus)
+        self._camera.SetPosition(position)
+        self._camera.SetViewUp(pose.up)
         if len(bounds):
-            low, high = bounds[:, ::2].min(axis=0), bounds[:, 1::2].max(axis=0)
             self.layers[0].ResetCameraClippingRange([*np.stack([low, high]).T.ravel()])
+
+    @property
+    def _parallel_scale(self) -> float:
+        """Half the height of the picture in metres: what perspective shows at the focus."""
+        return float(self.pose.distance * np.tan(VIEW_ANGLE / 2))
 
     @property
     def aspect(self) -> float:
@@ -132,6 +190,7 @@ class Canvas(QVTKRenderWindowInteractor):
             as_array(self._camera.GetViewTransformMatrix()),
             (self.width(), self.height()),
             VIEW_ANGLE,
+            self._parallel_scale if self.is_parallel else None,
         )
 
     # Moving
@@ -139,9 +198,13 @@ class Canvas(QVTKRenderWindowInteractor):
     def move_to(self, pose: Pose) -> None:
         """Put the camera there at once; draw quickly now and fully a moment later."""
         self.pose = pose
-        self.is_moving = True
+        self._set_moving()
         self._resting.start()
         self.draw()
+
+    def _set_moving(self) -> None:
+        self.is_moving, self.seconds_to_draw = True, 0.0
+        self._settling.stop()
 
     def fly_to(self, pose: Pose, *, fly: bool = True) -> None:
         """Take the camera there in `FLIGHT_MS`, or at once."""
@@ -150,7 +213,7 @@ class Canvas(QVTKRenderWindowInteractor):
             self.move_to(pose)
             return
         self._flight_ends = (self.pose, pose)
-        self.is_moving = True
+        self._set_moving()
         self._flight.start()
 
     def _fly_on(self, share: float) -> None:
@@ -160,7 +223,12 @@ class Canvas(QVTKRenderWindowInteractor):
         if QApplication.mouseButtons() & (LEFT | MIDDLE) and self._is_drag:
             self._resting.start()
             return
-        self.is_moving = False
+        self.is_moving, self.seconds_to_draw = False, REST_SECONDS
+        self._settling.start()
+        self.draw()
+
+    def _settle(self) -> None:
+        self.seconds_to_draw = SETTLED_SECONDS
         self.draw()
 
     # Mouse
@@ -234,8 +302,13 @@ class Canvas(QVTKRenderWindowInteractor):
         """Let go of VTK while its context is there."""
         self._flight.stop()
         self._resting.stop()
+        self._settling.stop()
         self.point_under = lambda _: None
         window = self.GetRenderWindow()
+        if self._shading is not None:
+            self.layers[0].SetPass(None)
+            self._shading.ReleaseGraphicsResources(window)
+            self._shading = None
         for layer in self.layers:
             layer.RemoveAllViewProps()
             if window is not None:

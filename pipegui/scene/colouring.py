@@ -1,35 +1,37 @@
 """What colour each point has. Qt- and VTK-free."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result
+from pipecore.report.summary import by_verdict
+from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
 from pipegui.colour_maps import (
     HEIGHT,
     INTENSITY,
+    KINDS,
     QUALITATIVE,
     Colours,
     deviation_colours,
     look_up,
+    rgb,
 )
-from pipegui.document import ColourBy, ViewOptions
+from pipegui.colours import VERDICT
+from pipegui.document import Box, ColourBy, ViewOptions
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
 
 MUTED = {False: (217, 221, 227), True: (70, 76, 84)}
 """Points that the colouring says nothing about, on light and on dark background."""
 
-KIND_COLOUR = {
-    ElementKind.CYLINDER: QUALITATIVE[0],
-    ElementKind.TORUS: QUALITATIVE[1],
-    ElementKind.CONE: QUALITATIVE[2],
-    ElementKind.SPHERE: QUALITATIVE[3],
-    ElementKind.FLANGE: QUALITATIVE[4],
-    ElementKind.TEE: QUALITATIVE[5],
-    ElementKind.OTHER: QUALITATIVE[9],
-}
+KIND_COLOUR = dict(zip(ElementKind, KINDS, strict=True))
+SOUND = (157, 190, 217)
+"""Where a pipe has no deformation, in the colours of the verdicts."""
 PROFILE_COLOURS = QUALITATIVE[[0, 1]]
+
+Rows = NDArray[np.intp] | slice
+ALL = slice(None)
 
 NEEDS_RESULT = {
     ColourBy.SEGMENT,
@@ -37,6 +39,7 @@ NEEDS_RESULT = {
     ColourBy.KIND,
     ColourBy.DEVIATION,
     ColourBy.PROFILE,
+    ColourBy.VERDICT,
 }
 
 
@@ -52,20 +55,39 @@ def effective(colour_by: ColourBy, cloud: PointCloud, result: Result | None) -> 
 
 
 def colour_points(
-    cloud: PointCloud, result: Result | None, view: ViewOptions, *, dark: bool = False
+    cloud: PointCloud,
+    result: Result | None,
+    view: ViewOptions,
+    *,
+    dark: bool = False,
+    rows: Rows = ALL,
 ) -> Colours:
-    """Return the colour of every point, uint8, shape (n, 3)."""
+    """Return the colours of some points of the cloud or of all, uint8, shape (n, 3)."""
     colour_by = effective(view.colour_by, cloud, result)
-    return _COLOURING[colour_by](cloud, result, view, MUTED[dark])
+    return _COLOURING[colour_by](_Asked(cloud, result, view, MUTED[dark], rows))
 
 
-def visible_points(result: Result | None, hidden: frozenset[int]) -> NDArray[np.bool_] | None:
-    """Return which points are not of hidden elements, or None if all are seen."""
-    if result is None or not hidden:
-        return None
-    shown = np.ones(len(result.elements) + 1, np.bool_)
-    shown[[i for i in hidden if i < len(shown)]] = False
-    return shown[result.element_id]
+def visible_points(
+    cloud: PointCloud, result: Result | None, hidden: frozenset[int], box: Box | None = None
+) -> NDArray[np.bool_] | None:
+    """Return which points are in the box and not of hidden elements, None if all are."""
+    seen = None if box is None else points_in(box, cloud.xyz)
+    if result is not None and hidden:
+        shown = np.ones(len(result.elements) + 1, np.bool_)
+        shown[[i for i in hidden if i < len(shown)]] = False
+        seen = shown[result.element_id] if seen is None else seen & shown[result.element_id]
+    return seen
+
+
+def points_in(box: Box, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
+    """Return which points lie in a box."""
+    inside = np.ones(len(xyz), np.bool_)
+    for axis in range(3):
+        # In the points' own type: as float64 they would take room three times over.
+        low, high = xyz.dtype.type(box.low[axis]), xyz.dtype.type(box.high[axis])
+        inside &= xyz[:, axis] >= low
+        inside &= xyz[:, axis] <= high
+    return inside
 
 
 def visible_elements(result: Result | None, hidden: frozenset[int]) -> tuple[Element, ...]:
@@ -111,44 +133,81 @@ def _apart(cloud: PointCloud, result: Result, colour_by: ColourBy) -> NDArray[np
     return colour_apart(int(ids.max(initial=0)), pairs, len(QUALITATIVE))
 
 
-Muted = tuple[int, int, int]
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is to be coloured, and how."""
+
+    cloud: PointCloud
+    result: Result
+    view: ViewOptions
+    muted: tuple[int, int, int]
+    rows: Rows
 
 
-def _by_rgb(cloud: PointCloud, _: None, __: ViewOptions, ___: Muted) -> Colours:
-    return cloud.rgb
+def _by_rgb(asked: _Asked) -> Colours:
+    return asked.cloud.rgb[asked.rows]
 
 
-def _by_intensity(cloud: PointCloud, _: None, __: ViewOptions, muted: Muted) -> Colours:
-    return look_up(INTENSITY, _share(cloud.intensity, intensity_range(cloud)), muted)
+def _by_intensity(asked: _Asked) -> Colours:
+    share = _share(asked.cloud.intensity[asked.rows], intensity_range(asked.cloud))
+    return look_up(INTENSITY, share, asked.muted)
 
 
-def _by_height(cloud: PointCloud, _: None, __: ViewOptions, muted: Muted) -> Colours:
-    return look_up(HEIGHT, _share(cloud.xyz[:, 2], height_range(cloud)), muted)
+def _by_height(asked: _Asked) -> Colours:
+    share = _share(asked.cloud.xyz[asked.rows, 2], height_range(asked.cloud))
+    return look_up(HEIGHT, share, asked.muted)
 
 
-def _by_deviation(_: PointCloud, result: Result, view: ViewOptions, muted: Muted) -> Colours:
-    return deviation_colours(1000 * result.deviation, view.deviation_limit_mm, muted)
+def _by_deviation(asked: _Asked) -> Colours:
+    deviation_mm = 1000 * asked.result.deviation[asked.rows]
+    return deviation_colours(deviation_mm, asked.view.deviation_limit_mm, asked.muted)
 
 
-def _by_kind(_: PointCloud, result: Result, __: ViewOptions, muted: Muted) -> Colours:
-    table = np.array([muted, *(KIND_COLOUR[e.kind] for e in result.elements)], np.uint8)
-    return table[result.element_id]
+def _by_kind(asked: _Asked) -> Colours:
+    kinds = [KIND_COLOUR[e.kind] for e in asked.result.elements]
+    table = np.array([asked.muted, *kinds], np.uint8)
+    return table[asked.result.element_id[asked.rows]]
 
 
-def _by_id(cloud: PointCloud, result: Result, view: ViewOptions, muted: Muted) -> Colours:
-    table = QUALITATIVE[_apart(cloud, result, view.colour_by)]
-    table[NO_ID] = muted
-    return table[_ids(result, view.colour_by)]
+def _by_id(asked: _Asked) -> Colours:
+    table = QUALITATIVE[_apart(asked.cloud, asked.result, asked.view.colour_by)]
+    table[NO_ID] = asked.muted
+    return table[_ids(asked.result, asked.view.colour_by)[asked.rows]]
 
 
-def _by_profile(cloud: PointCloud, result: Result, view: ViewOptions, muted: Muted) -> Colours:
-    """Colours that alternate from profile to profile; fainter where there is no segment."""
-    stack = next((s for s in result.stacks if s.stack_id == view.shown_stack), None)
-    if stack is None:
-        return np.broadcast_to(np.array(muted, np.uint8), (len(cloud), 3)).copy()
-    faint = (PROFILE_COLOURS.astype(np.int32) + 2 * np.array(muted)) // 3
+def _by_verdict(asked: _Asked) -> Colours:
+    """Deformed stretches in the colour of their verdict, the worst over the others."""
+    table = np.full((len(asked.result.elements) + 1, 3), SOUND, np.uint8)
+    table[NO_ID] = asked.muted
+    ids, xyz = asked.result.element_id[asked.rows], asked.cloud.xyz[asked.rows]
+    colours = table[ids]
+    for deformation in reversed(by_verdict(asked.result)):
+        at = np.flatnonzero(ids == deformation.element_id)
+        axis = asked.result.element(deformation.element_id).axis
+        chainage, _, _ = axis.pipe_coordinates(xyz[at].astype(np.float64))
+        low, high = deformation.chainage_start, deformation.chainage_end
+        colours[at[(chainage >= low) & (chainage <= high)]] = rgb(VERDICT[deformation.verdict])
+    return colours
+
+
+def _by_profile(asked: _Asked) -> Colours:
+    """Colours that alternate from profile to profile; fainter where there is no segment.
+
+    Where one profile is shown alone, the others are muted; see `profile_points` for it.
+    """
+    muted, ids = np.array(asked.muted, np.uint8), asked.result.segment_id[asked.rows]
+    stack = stack_of(asked.result, asked.view.shown_stack)
+    if stack is None or asked.view.shown_profile is not None:
+        return np.broadcast_to(muted, (len(ids), 3)).copy()
+    faint = (PROFILE_COLOURS.astype(np.int32) + 2 * muted.astype(np.int32)) // 3
     table = np.stack([faint, PROFILE_COLOURS]).astype(np.uint8)
-    return table[(result.segment_id != NO_ID).astype(np.intp), stack.profile_index(cloud.xyz) % 2]
+    parity = stack.profile_index(asked.cloud.xyz[asked.rows]) % 2
+    return table[(ids != NO_ID).astype(np.intp), parity]
+
+
+def stack_of(result: Result, stack_id: int) -> Stack | None:
+    """Return the stack with this id, if there is one."""
+    return next((s for s in result.stacks if s.stack_id == stack_id), None)
 
 
 _COLOURING = {
@@ -160,4 +219,5 @@ _COLOURING = {
     ColourBy.SEGMENT: _by_id,
     ColourBy.ELEMENT: _by_id,
     ColourBy.PROFILE: _by_profile,
+    ColourBy.VERDICT: _by_verdict,
 }

@@ -32,6 +32,8 @@ class Decorations:
         self._layers = layers
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
         self._accented: dict[bool, vtkActor] = {}
+        self.dark = False
+        """Whether it is drawn on a dark background."""
 
     def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
         """Show the decorations of `state` where they differ from `before`."""
@@ -62,6 +64,9 @@ class Decorations:
         for name in list(self._groups):
             self._replace(name, ())
 
+    def _tint(self, role: str) -> QColor:
+        return theme.colour(role, dark=self.dark)
+
     def _replace(self, name: str, actors: Iterable[tuple[int, vtkActor]]) -> None:
         for layer, actor in self._groups.pop(name, ()):
             layer.RemoveActor(actor)
@@ -72,7 +77,7 @@ class Decorations:
     def _axes(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         elements = visible_elements(state.result, state.view.hidden_elements)
         if state.view.show_axes and elements:
-            yield 1, _lines(shapes.axis_lines(elements), theme.colour("text"), 1.0, 0.55)
+            yield 1, _lines(shapes.axis_lines(elements), self._tint("text"), 1.0, 0.55)
 
     def _surfaces(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         elements = visible_elements(state.result, state.view.hidden_elements)
@@ -93,14 +98,14 @@ class Decorations:
             mask = np.isin(profiles.element_id, shown) & (profiles.stack_id == OWN_STACK)
             profiles = profiles[mask]
         if len(profiles):
-            yield 0, _lines(shapes.ellipse_lines(profiles), theme.colour("text"), 1.0, 0.8)
+            yield 0, _lines(shapes.ellipse_lines(profiles), self._tint("text"), 1.0, 0.8)
 
     def _highlight(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         self._accented = {}
         element = selected_element(state)
         if element is None:
             return
-        accent = theme.colour("accent")
+        accent = self._tint("accent")
         colour_by = effective(state.view.colour_by, state.cloud, state.result)
         if colour_by in ACCENT_POINTS and state.view.show_points:
             rows = np.flatnonzero(state.result.element_id == element.element_id)
@@ -115,12 +120,12 @@ class Decorations:
         if state.profile is None:
             return
         if len(state.profile_xyz):
-            points = _points(state.profile_xyz, theme.colour("text"))
+            points = _points(state.profile_xyz, self._tint("text"))
             points.GetProperty().SetPointSize(3.0)
             yield 1, points
         ring = shapes.ellipse_lines(state.profile)
         if ring.n_points:
-            yield 1, _lines(ring, theme.colour("accent"), 3.0)
+            yield 1, _lines(ring, self._tint("accent"), 3.0)
 
 
 def selected_element(state: SceneState) -> Element | None:

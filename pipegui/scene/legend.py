@@ -6,9 +6,17 @@ import numpy as np
 
 from pipecore.report.format import MINUS
 from pipecore.types import ElementKind, PointCloud, Result
-from pipegui.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours
+from pipegui.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours, rgb
+from pipegui.colours import VERDICT
 from pipegui.document import ColourBy, ViewOptions
-from pipegui.scene.colouring import KIND_COLOUR, PROFILE_COLOURS, effective, height_range
+from pipegui.scene.colouring import (
+    KIND_COLOUR,
+    PROFILE_COLOURS,
+    SOUND,
+    effective,
+    height_range,
+    stack_of,
+)
 
 Swatch = tuple[tuple[int, int, int], str]
 
@@ -54,11 +62,17 @@ def make_legend(cloud: PointCloud, result: Result | None, view: ViewOptions) -> 
         return Legend("Height, m", HEIGHT, ticks)
     if colour_by is ColourBy.INTENSITY:
         return Legend("Intensity", INTENSITY, ((0.0, "low"), (1.0, "high")))
+    return _result_legend(colour_by, result, view) if result is not None else None
+
+
+def _result_legend(colour_by: ColourBy, result: Result, view: ViewOptions) -> Legend | None:
     if colour_by is ColourBy.KIND:
         kinds = {e.kind for e in result.elements}
         return Legend("Kind", swatches=tuple(_swatch(k) for k in KIND_COLOUR if k in kinds))
+    if colour_by is ColourBy.VERDICT:
+        return Legend("Verdict", swatches=_verdict_swatches(result))
     if colour_by is ColourBy.PROFILE:
-        return _profile_legend(result, view.shown_stack)
+        return _profile_legend(result, view)
     return None
 
 
@@ -76,8 +90,14 @@ def _swatch(kind: ElementKind) -> Swatch:
     return (red, green, blue), KIND_NAME[kind]
 
 
-def _profile_legend(result: Result, stack_id: int) -> Legend:
-    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
+def _verdict_swatches(result: Result) -> tuple[Swatch, ...]:
+    given = {d.verdict for d in result.deformations}
+    colours = [(rgb(VERDICT[v]), str(v).capitalize()) for v in VERDICT if v in given]
+    return (*reversed(colours), (SOUND, "No deformation"))
+
+
+def _profile_legend(result: Result, view: ViewOptions) -> Legend:
+    stack = stack_of(result, view.shown_stack)
     if stack is None:
         return Legend("No stack is shown: tick one in the stacks panel.")
     even, odd = (tuple(c) for c in PROFILE_COLOURS.tolist())

@@ -77,6 +77,8 @@ class Overlay(QWidget):
         self._projection: Projection | None = None
         self._pose: Pose | None = None
         self._targets: list[tuple[QRectF, int]] = []
+        self.dark = False
+        """Whether it is drawn on a dark background."""
 
     def follow(self, projection: Projection, pose: Pose) -> None:
         """Take the camera of the picture that is being drawn."""
@@ -131,7 +133,7 @@ class Overlay(QWidget):
     def _draw_label(
         self, painter: QPainter, anchor: QPointF, box: QRectF | None, label: Label
     ) -> None:
-        line = theme.colour("accent") if label.is_selected else label.colour
+        line = self._tint("accent") if label.is_selected else label.colour
         if box is not None:
             edge = QPointF(
                 float(np.clip(anchor.x(), box.left(), box.right())),
@@ -139,19 +141,19 @@ class Overlay(QWidget):
             )
             painter.setPen(QPen(line, 1.5))
             painter.drawLine(anchor, edge)
-        painter.setPen(QPen(theme.colour("base"), 1.5))
+        painter.setPen(QPen(self._tint("base"), 1.5))
         painter.setBrush(line)
         painter.drawEllipse(anchor, 4.5, 4.5)
         if box is None:
             return
         painter.setPen(QPen(line, 2.0 if label.is_selected else 1.0))
-        painter.setBrush(_paper())
+        painter.setBrush(self._paper())
         painter.drawRoundedRect(box, 4, 4)
         icon = QRect(
             round(box.left()) + SPACING - 2, round(box.center().y()) - ICON // 2, ICON, ICON
         )
         label.icon.paint(painter, icon)
-        painter.setPen(theme.colour("text"))
+        painter.setPen(self._tint("text"))
         text = box.adjusted(ICON + 1.5 * SPACING, 0, 0, 0)
         painter.drawText(text, Qt.AlignmentFlag.AlignVCenter, label.text)
 
@@ -167,9 +169,9 @@ class Overlay(QWidget):
         height = line + rows + SPACING
         box = QRectF(self.width() - width - 1.5 * SPACING, 1.5 * SPACING, width, height)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(_paper())
+        painter.setBrush(self._paper())
         painter.drawRoundedRect(box, 4, 4)
-        painter.setPen(theme.colour("text"))
+        painter.setPen(self._tint("text"))
         left, top = box.left() + SPACING, box.top() + SPACING / 2
         painter.drawText(QPointF(left, top + metrics.ascent()), legend.title)
         top += line
@@ -179,7 +181,7 @@ class Overlay(QWidget):
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(red, green, blue))
             painter.drawRoundedRect(QRectF(left, top + 3, 12, 12), 2, 2)
-            painter.setPen(theme.colour("text"))
+            painter.setPen(self._tint("text"))
             painter.drawText(QPointF(left + 2.5 * SPACING, top + metrics.ascent()), text)
             top += line
         return box
@@ -190,7 +192,7 @@ class Overlay(QWidget):
         bar = QRectF(corner.x(), corner.y(), SCALE_WIDTH, SCALE_HEIGHT)
         painter.drawImage(bar, image)
         metrics = painter.fontMetrics()
-        painter.setPen(theme.colour("text"))
+        painter.setPen(self._tint("text"))
         for share, text in legend.ticks:
             y = bar.bottom() - share * bar.height()
             painter.drawLine(QPointF(bar.right(), y), QPointF(bar.right() + 4, y))
@@ -207,7 +209,7 @@ class Overlay(QWidget):
         height = 2 * TRIAD_REACH
         corner = QRectF(SPACING, self.height() - height - SPACING, width, height)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(_paper(170))
+        painter.setBrush(self._paper(170))
         painter.drawRoundedRect(corner, 4, 4)
         middle = QPointF(corner.left() + TRIAD_REACH, corner.center().y())
         self._draw_triad(painter, middle, pose)
@@ -220,7 +222,7 @@ class Overlay(QWidget):
         axes = zip(np.eye(3), "ENH", strict=True)
         for axis, name in sorted(axes, key=lambda a: a[0] @ pose.forward):
             tip = QPointF(axis @ pose.right, -(axis @ pose.up))
-            fade = QColor(theme.colour("text"))
+            fade = QColor(self._tint("text"))
             fade.setAlphaF(1.0 if axis @ pose.forward < 0.1 else 0.55)
             painter.setPen(QPen(fade, 1.6))
             painter.drawLine(middle, middle + TRIAD_PX * tip)
@@ -233,15 +235,17 @@ class Overlay(QWidget):
 
     def _draw_scale_bar(self, painter: QPainter, left: QPointF, length: float, text: str) -> None:
         tick, right = QPointF(0, 4), left + QPointF(length, 0)
-        painter.setPen(QPen(theme.colour("text"), 1.6))
+        painter.setPen(QPen(self._tint("text"), 1.6))
         painter.drawLine(left, right)
         for end in (left, right):
             painter.drawLine(end - tick, end + tick)
         box = QRectF(left.x() - SPACING, left.y() - 26, length + 2 * SPACING, 20)
         painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
 
+    def _tint(self, role: str) -> QColor:
+        return theme.colour(role, dark=self.dark)
 
-def _paper(alpha: int = 225) -> QColor:
-    paper = QColor(theme.colour("base"))
-    paper.setAlpha(alpha)
-    return paper
+    def _paper(self, alpha: int = 225) -> QColor:
+        paper = self._tint("base")
+        paper.setAlpha(alpha)
+        return paper

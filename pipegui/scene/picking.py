@@ -1,7 +1,7 @@
 """Which point is under the cursor: points are projected one by one, the nearest wins."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
@@ -73,7 +73,7 @@ def warm_up() -> None:
 
 
 def pick_point(
-    xyz: NDArray[np.floating], projection: Projection, cursor: tuple[float, float]
+    parts: Sequence[NDArray[np.floating]], projection: Projection, cursor: tuple[float, float]
 ) -> int:
     """Return the row of the point that somebody clicking at `cursor` means, or -1.
 
@@ -82,14 +82,18 @@ def pick_point(
 
     Parameters
     ----------
-    xyz : ndarray, shape (n, 3), C-contiguous
+    parts : sequence of ndarray, shape (n, 3), C-contiguous
+        The points; rows count through all parts.
     projection : Projection
     cursor : tuple of float
         Pixels from the left and from the top.
     """
-    rows, depths, distances = points_near(xyz, projection, cursor, PICK_RADIUS_PX)
+    starts = np.cumsum([0, *(len(xyz) for xyz in parts)])
+    found = [points_near(xyz, projection, cursor, PICK_RADIUS_PX) for xyz in parts]
+    rows = np.concatenate([near[0] + i for near, i in zip(found, starts, strict=False)] or [[]])
     if not len(rows):
         return -1
+    depths, distances = (np.concatenate([near[i] for near in found]) for i in (1, 2))
     front = depths.min()
     is_front = depths <= front + LAYER_PX * projection.pixel_size(front)
     return int(rows[is_front][np.argmin(distances[is_front])])

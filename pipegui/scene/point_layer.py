@@ -1,25 +1,36 @@
-"""The points of a cloud in VTK: shuffled once, drawn in as many as there is time for."""
+"""The points of a cloud in VTK: drawn in as many as there is time for.
+
+Only what is drawn is copied, so that a cloud of any size costs no more than is seen of it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
-from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkRenderer
 
+from pipecore.geometry import Array
 from pipecore.types import Floats, PointCloud
 from pipegui.colour_maps import Colours
+from pipegui.scene.spreading import Spread
 
-SMALLEST_LEVEL = 25_000
+SMALLEST_SLICE, LARGEST_SLICE = 25_000, 4_000_000
 MOVING_LEVEL = 400_000
 """At most so many points are drawn while the camera moves."""
-LEVEL_FACTOR = 4
-MOVING_SECONDS = 0.1
-RESTING_SECONDS = 1.5
-FRAME_SECONDS = 0.03
+MOVING_SECONDS = 0.06
+"""For the points of a frame while the camera moves: the rest of 0.1 s is for all else."""
+FRAME_SECONDS = 0.02
 """What a frame costs without points, about."""
-MAX_POINT_PX = 5.0
+MIN_POINT_PX, MAX_POINT_PX = 1.0, 5.0
+
+Rows = NDArray[np.intp]
+ColourRows = Callable[[Rows], Colours]
+"""Colours (n, 3) of rows of the cloud."""
 
 
 def point_actor(xyz: NDArray[np.float32], colours: Colours) -> vtkActor:
@@ -40,104 +51,158 @@ def point_actor(xyz: NDArray[np.float32], colours: Colours) -> vtkActor:
     return actor
 
 
-class PointLayer:
-    """All points in levels of detail: each the first so many of the shuffled points.
+@dataclass(eq=False)
+class _Slice:
+    stop: int
+    rows: Rows
+    xyz: NDArray[np.float32]
+    colours: Colours
+    actor: vtkActor
+    is_uploaded: bool = False
 
-    While the camera moves, a level is drawn that takes no more than `MOVING_SECONDS`;
-    at rest the largest that takes no more than `RESTING_SECONDS`.
+
+class PointLayer:
+    """The points in an order that spreads them evenly, cut into slices.
+
+    While the camera moves, as many slices are drawn as take no more than
+    `MOVING_SECONDS`; at rest as many as take no more than the time that is given.
     """
 
     def __init__(self, renderer: vtkRenderer) -> None:
         self._renderer = renderer
-        self._shuffled = np.empty(0, np.int32)
-        self._levels: list[tuple[int, vtkActor]] = []
-        self._order = np.empty(0, np.int32)
-        self._colours = np.empty((0, 3), np.uint8)
-        self._shown = -1
+        self._cloud: PointCloud | None = None
+        self._visible: Rows | None = None
+        self._spread = Spread(0)
+        self._colour: ColourRows | None = None
+        self._slices: list[_Slice] = []
         self._seconds_per_point = 1e-7
-        self._is_new: set[int] = set()
-        self.xyz = np.empty((0, 3), np.float32)
+        self._clip: tuple[Array, Array] | None = None
+        self._is_drawing_new = False
+        self.n_shown = 0
+        """Number of points in the slices that are shown."""
         self.spacing = 0.01
         self.point_px = MAX_POINT_PX
 
+    def __len__(self) -> int:
+        """Return the number of points that can be seen."""
+        return len(self._spread)
+
     @property
-    def quick_xyz(self) -> NDArray[np.float32]:
-        """The points of the level for moving: enough for hovering."""
-        return self.xyz[:MOVING_LEVEL]
+    def parts(self) -> list[NDArray[np.float32]]:
+        """The points that have been drawn, in parts."""
+        return [s.xyz for s in self._slices]
+
+    @property
+    def quick_parts(self) -> list[NDArray[np.float32]]:
+        """The points that are drawn while moving: enough for hovering."""
+        return [s.xyz for s in self._slices if s.stop <= MOVING_LEVEL] or self.parts[:1]
 
     def cloud_index(self, row: int) -> int:
-        """Index in the cloud of a row of `xyz`."""
-        return int(self._order[row])
-
-    def set_cloud(self, cloud: PointCloud) -> None:
-        """Take another cloud."""
-        shuffled = np.random.default_rng(0).permutation(len(cloud)).astype(np.int32)
-        self._shuffled = shuffled
-        self.spacing = estimate_spacing(cloud.xyz)
+        """Index in the cloud of a row of `parts`, counted through."""
+        for part in self._slices:
+            if row < part.stop:
+                return int(part.rows[row - part.stop + len(part.rows)])
+        raise IndexError(row)
 
     def set_points(
-        self, cloud: PointCloud, visible: NDArray[np.bool_] | None, colours: Colours
+        self, cloud: PointCloud, visible: NDArray[np.bool_] | None, colour: ColourRows
     ) -> None:
-        """Show the `visible` points (None: all) in their colours (n, 3)."""
-        order = self._shuffled
-        self._order = order if visible is None else order[visible[order]]
-        self.xyz = np.ascontiguousarray(cloud.xyz[self._order], np.float32)
-        self._colours = np.ascontiguousarray(colours[self._order])
+        """Show the `visible` points (None: all) of a cloud."""
         self.clear_actors()
-        n = len(self.xyz)
-        counts = [SMALLEST_LEVEL]
-        while counts[-1] < n:
-            counts.append(counts[-1] * LEVEL_FACTOR)
-        for count in {min(c, n): None for c in counts if n}:
-            actor = point_actor(self.xyz[:count], self._colours[:count])
-            actor.VisibilityOff()
-            self._renderer.AddActor(actor)
-            self._levels.append((count, actor))
-        self._is_new = set(range(len(self._levels)))
+        if cloud is not self._cloud:
+            self.spacing = estimate_spacing(cloud.xyz)
+        self._cloud, self._colour = cloud, colour
+        self._visible = None if visible is None else np.flatnonzero(visible)
+        self._spread = Spread(len(cloud) if self._visible is None else len(self._visible))
+        self._reach(SMALLEST_SLICE)
 
-    def set_colours(self, colours: Colours) -> None:
-        """Recolour the points; `colours` are of all points of the cloud."""
-        np.take(colours, self._order, axis=0, out=self._colours)
-        for _, actor in self._levels:
-            actor.GetMapper().GetInput().GetPointData().GetScalars().Modified()
-        self._is_new = set(range(len(self._levels)))
+    def set_colours(self, colour: ColourRows) -> None:
+        """Recolour the points."""
+        self._colour = colour
+        for part in self._slices:
+            part.colours[:] = colour(part.rows)
+            part.actor.GetMapper().GetInput().GetPointData().GetScalars().Modified()
+            part.is_uploaded = False
 
-    def show(self, *, moving: bool, pixel_size: float, visible: bool = True) -> None:
-        """Switch to the level for moving or resting; a pixel is so large at the focus."""
-        self._shown = self._level(moving=moving) if visible else -1
-        for i, (count, actor) in enumerate(self._levels):
-            actor.SetVisibility(i == self._shown)
-            if i == self._shown:
-                spacing = self.spacing * np.sqrt(min(len(self.xyz) / count, 4))
-                self.point_px = float(np.clip(1.2 * spacing / pixel_size, 1.5, MAX_POINT_PX))
-                actor.GetProperty().SetPointSize(self.point_px)
+    def show(
+        self, *, seconds: float, pixel_size: float, visible: bool = True, size: float = 1.0
+    ) -> None:
+        """Show what can be drawn in so many seconds, 0 while the camera moves.
 
-    @property
-    def n_shown(self) -> int:
-        """Number of points in the level that is shown."""
-        return self._levels[self._shown][0] if self._shown >= 0 else 0
+        A pixel is `pixel_size` metres large at the focus.
+        """
+        limit = (seconds or MOVING_SECONDS) / self._seconds_per_point
+        limit = max(limit, MOVING_LEVEL) if seconds else min(limit, MOVING_LEVEL)
+        shown = self._reach(limit) if visible else []
+        self.n_shown = shown[-1].stop if shown else 0
+        self._is_drawing_new = not all(part.is_uploaded for part in shown)
+        if shown:
+            spacing = self.spacing * np.sqrt(min(len(self) / self.n_shown, 4))
+            suiting = np.clip(1.2 * spacing / pixel_size, 1.5, MAX_POINT_PX)
+            self.point_px = float(max(size * suiting, MIN_POINT_PX))
+        for i, part in enumerate(self._slices):
+            part.actor.SetVisibility(i < len(shown))
+            part.actor.GetProperty().SetPointSize(self.point_px)
+        for part in shown:
+            part.is_uploaded = True
 
     def learn(self, seconds: float) -> None:
         """Take note how long the last frame took. First frames upload and do not count."""
-        if self._shown in self._is_new:
-            self._is_new.discard(self._shown)
-        elif self._shown >= 0:
+        if not self._is_drawing_new and self.n_shown:
             measured = max(seconds - FRAME_SECONDS, 1e-4) / self.n_shown
             # A frame of few points says little about what a point costs.
             weight = 0.5 * min(self.n_shown / MOVING_LEVEL, 1)
             self._seconds_per_point += weight * (measured - self._seconds_per_point)
 
+    def clip(self, low: Array, high: Array) -> None:
+        """Draw only what lies between two corners; see `set_points` for leaving points out."""
+        self._clip = low, high
+        for part in self._slices:
+            _set_planes(part.actor, low, high)
+
     def clear_actors(self) -> None:
         """Take all points out of the renderer."""
-        for _, actor in self._levels:
-            self._renderer.RemoveActor(actor)
-        self._levels, self._shown = [], -1
+        for part in self._slices:
+            self._renderer.RemoveActor(part.actor)
+        self._slices, self.n_shown = [], 0
+        self._cloud = self._visible = self._colour = self._clip = None
+        self._spread = Spread(0)
 
-    def _level(self, *, moving: bool) -> int:
-        limit = (MOVING_SECONDS if moving else RESTING_SECONDS) / self._seconds_per_point
-        limit = min(limit, MOVING_LEVEL) if moving else max(limit, MOVING_LEVEL)
-        fitting = [i for i, (count, _) in enumerate(self._levels) if count <= limit]
-        return max(fitting, default=0 if self._levels else -1)
+    def _reach(self, limit: float) -> list[_Slice]:
+        """Return the slices up to `limit` points, at least the first; make those not there yet."""
+        stop = self._slices[-1].stop if self._slices else 0
+        while stop < len(self):
+            start, stop = stop, min(max(2 * stop, SMALLEST_SLICE), stop + LARGEST_SLICE, len(self))
+            if start and stop > limit:
+                break
+            self._slices.append(self._make_slice(start, stop))
+        return [s for i, s in enumerate(self._slices) if i == 0 or s.stop <= limit]
+
+    def _make_slice(self, start: int, stop: int) -> _Slice:
+        assert self._cloud is not None
+        assert self._colour is not None
+        rows = self._spread.rows(start, stop)
+        if self._visible is not None:
+            rows = self._visible[rows]
+        xyz = np.take(self._cloud.xyz, rows, axis=0).astype(np.float32, copy=False)
+        colours = np.ascontiguousarray(self._colour(rows))
+        actor = point_actor(xyz, colours)
+        actor.VisibilityOff()
+        if self._clip is not None:
+            _set_planes(actor, *self._clip)
+        self._renderer.AddActor(actor)
+        return _Slice(stop, rows, xyz, colours, actor)
+
+
+def _set_planes(actor: vtkActor, low: Array, high: Array) -> None:
+    mapper = actor.GetMapper()
+    mapper.RemoveAllClippingPlanes()
+    for corner, sign in ((low, 1.0), (high, -1.0)):
+        for axis in range(3):
+            plane = vtkPlane()
+            plane.SetOrigin(corner)
+            plane.SetNormal(sign * np.eye(3)[axis])
+            mapper.AddClippingPlane(plane)
 
 
 def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:

@@ -113,7 +113,9 @@ def looking_along(pose: Pose, forward: Array, *, steepest: float = np.deg2rad(50
     )
 
 
-def framing(pose: Pose, points: Array, aspect: float, margin: float = 1.15) -> Pose:
+def framing(
+    pose: Pose, points: Array, aspect: float, margin: float = 1.15, *, parallel: bool = False
+) -> Pose:
     """Return the pose moved so that `points` (n, 3) fill the picture but for a margin.
 
     Parameters
@@ -122,9 +124,16 @@ def framing(pose: Pose, points: Array, aspect: float, margin: float = 1.15) -> P
         Width over height of the picture.
     margin : float
         1 leaves none.
+    parallel : bool
+        Whether the picture is drawn without perspective.
     """
     axes = np.stack([pose.right, pose.up, pose.forward])
     seen = points @ axes.T
+    if parallel:
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        half = float(((high - low)[:2] / [aspect, 1.0]).max()) / 2 * margin
+        distance = max(half / np.tan(VIEW_ANGLE / 2), 10 * MIN_DISTANCE)
+        return replace(pose, focus=(low + high) / 2 @ axes, distance=distance)
     # A point at depth d is in the picture if it is at most d · slope to the side: two planes
     # through the camera for each side, and the camera is where those that touch meet.
     slope = np.tan(VIEW_ANGLE / 2) / margin * np.array([aspect, 1.0])

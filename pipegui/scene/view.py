@@ -4,6 +4,7 @@ import math
 import threading
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -12,7 +13,9 @@ from pipecore.geometry import Array
 from pipecore.report.format import format_measure
 from pipecore.types import NO_ID, Deformation, DeformationKind
 from pipegui import theme
+from pipegui.colour_maps import Colours
 from pipegui.colours import VERDICT
+from pipegui.document import Background, ViewOptions
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
@@ -25,10 +28,16 @@ from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
 from pipegui.view_state import SceneState
 
-BACKGROUND = {False: ("#eef1f4", "#fbfcfd"), True: ("#15181b", "#262b31")}
-"""Bottom and top, in light and dark."""
+BACKGROUND = {
+    Background.LIGHT: ("#eef1f4", "#fbfcfd"),
+    Background.DARK: ("#15181b", "#262b31"),
+    Background.WHITE: ("#ffffff", "#ffffff"),
+    Background.BLACK: ("#000000", "#000000"),
+}
+"""Bottom and top."""
+IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
-COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack")
+COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 
 
 class SceneView(QWidget):
@@ -44,7 +53,7 @@ class SceneView(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._state = SceneState()
-        self._dark: bool | None = None
+        self._background: Background | None = None
         self._is_picking = False
         self._hovered = -1
         self.canvas = Canvas(self)
@@ -72,12 +81,15 @@ class SceneView(QWidget):
     def apply(self, state: SceneState) -> None:
         """Show `state`; only what differs from the last one is done anew."""
         before, self._state = self._state, state
-        is_new_theme = self._dark != theme.is_dark()
-        self._dark = theme.is_dark()
+        background = _background(state.view)
+        is_new_theme = background != self._background
         if is_new_theme:
-            self._set_background()
+            self._set_background(background)
+        self.canvas.is_parallel = state.view.is_parallel
+        self.canvas.eye_dome = state.view.eye_dome
         is_new_cloud = state.cloud is not before.cloud
         self._update_points(state, before, is_new_cloud=is_new_cloud, is_new_theme=is_new_theme)
+        self._decorations.dark = self.overlay.dark = background in IS_DARK
         self._decorations.update(state, before, everything=is_new_theme or is_new_cloud)
         self._update_overlay(state)
         if is_new_cloud and state.scan_key != before.scan_key:
@@ -93,23 +105,29 @@ class SceneView(QWidget):
         if cloud is None:
             self.points.clear_actors()
             return
-        if is_new_cloud:
-            self.points.set_cloud(cloud)
         is_new_result = state.result is not before.result
         is_recoloured = (
             is_new_theme
             or is_new_result
             or any(getattr(view, name) != getattr(before.view, name) for name in COLOURING)
         )
-        hidden = view.hidden_elements
-        is_other_subset = hidden != before.view.hidden_elements or (hidden and is_new_result)
-        if not (is_new_cloud or is_recoloured or is_other_subset):
-            return
-        colours = colour_points(cloud, state.result, view, dark=bool(self._dark))
+        hidden, box = view.hidden_elements, view.clip_box
+        is_other_subset = (
+            hidden != before.view.hidden_elements
+            or (hidden and is_new_result)
+            or box != before.view.clip_box
+        )
         if is_new_cloud or is_other_subset:
-            self.points.set_points(cloud, visible_points(state.result, hidden), colours)
-        else:
-            self.points.set_colours(colours)
+            visible = visible_points(cloud, state.result, hidden, box)
+            self.points.set_points(cloud, visible, self._colour)
+        elif is_recoloured:
+            self.points.set_colours(self._colour)
+
+    def _colour(self, rows: NDArray[np.intp]) -> Colours:
+        state = self._state
+        assert state.cloud is not None
+        dark = self._background in IS_DARK
+        return colour_points(state.cloud, state.result, state.view, dark=dark, rows=rows)
 
     def _update_overlay(self, state: SceneState) -> None:
         self.overlay.legend, self.overlay.labels = None, ()
@@ -122,18 +140,24 @@ class SceneView(QWidget):
                 if d.element_id not in state.view.hidden_elements
             )
 
-    def _set_background(self) -> None:
-        bottom, top = (QColor(c) for c in BACKGROUND[bool(self._dark)])
+    def _set_background(self, background: Background) -> None:
+        self._background = background
+        bottom, top = (QColor(c) for c in BACKGROUND[background])
         back = self.canvas.layers[0]
         back.SetBackground(bottom.redF(), bottom.greenF(), bottom.blueF())
         back.SetBackground2(top.redF(), top.greenF(), top.blueF())
         back.GradientBackgroundOn()
 
+    @property
+    def shades_edges(self) -> bool:
+        """Whether steps in depth are shaded where nobody has chosen."""
+        return self.canvas.is_drawn and not self.canvas.is_software
+
     # Camera
 
     def fit(self) -> None:
         """Fly to where everything is in view."""
-        if len(self.points.xyz):
+        if len(self.points):
             self._fly(self._fitted(self.canvas.pose))
 
     def set_standard_view(self, name: str) -> None:
@@ -145,12 +169,15 @@ class SceneView(QWidget):
         return self.canvas.pose.forward
 
     def _fitted(self, pose: Pose) -> Pose:
-        sample = self.points.quick_xyz[:20_000].astype(np.float64)
+        if not len(self.points):
+            return pose
+        sample = self.points.parts[0][:20_000].astype(np.float64)
         # A few stray points far away must not make the rest small.
         low, high = np.percentile(sample, [0.2, 99.8], axis=0)
         margin = 0.2 * (high - low)
         inside = np.all((sample >= low - margin) & (sample <= high + margin), axis=1)
-        return poses.framing(pose, sample[inside], self.canvas.aspect)
+        parallel = self._state.view.is_parallel
+        return poses.framing(pose, sample[inside], self.canvas.aspect, parallel=parallel)
 
     def _fly(self, pose: Pose) -> None:
         self.canvas.fly_to(pose, fly=self._state.view.fly)
@@ -163,9 +190,10 @@ class SceneView(QWidget):
     def _prepare_frame(self) -> None:
         canvas, projection = self.canvas, self.canvas.projection()
         self.points.show(
-            moving=canvas.is_moving,
+            seconds=canvas.seconds_to_draw,
             pixel_size=projection.pixel_size(canvas.pose.distance),
             visible=self._state.view.show_points,
+            size=self._state.view.point_size,
         )
         self._decorations.prepare(moving=canvas.is_moving, point_px=self.points.point_px)
         self.overlay.follow(projection, canvas.pose)
@@ -174,16 +202,16 @@ class SceneView(QWidget):
 
     def pick(self, position: QPointF) -> int:
         """Index in the cloud of the point that is seen at `position`, -1 if there is none."""
-        return self._pick(position, self.points.xyz)
+        return self._pick(position, self.points.parts)
 
-    def _pick(self, position: QPointF, xyz: np.ndarray) -> int:
-        if not len(xyz) or not self._state.view.show_points:
+    def _pick(self, position: QPointF, parts: list[NDArray[np.float32]]) -> int:
+        if not parts or not self._state.view.show_points:
             return -1
-        row = pick_point(xyz, self.canvas.projection(), (position.x(), position.y()))
+        row = pick_point(parts, self.canvas.projection(), (position.x(), position.y()))
         return self.points.cloud_index(row) if row >= 0 else -1
 
     def _point_under(self, position: QPointF) -> Array | None:
-        index = self._pick(position, self.points.quick_xyz)
+        index = self._pick(position, self.points.quick_parts)
         if index < 0 or self._state.cloud is None:
             return None
         return self._state.cloud.xyz[index].astype(np.float64)
@@ -208,7 +236,7 @@ class SceneView(QWidget):
     def _hover(self) -> None:
         if self._hover_at is None:
             return
-        index = self._pick(self._hover_at, self.points.quick_xyz)
+        index = self._pick(self._hover_at, self.points.quick_parts)
         if index >= 0 or self._hovered >= 0:
             self.hovered.emit(index)
         self._hovered = index
@@ -240,6 +268,12 @@ class SceneView(QWidget):
         self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)
+
+
+def _background(view: ViewOptions) -> Background:
+    if view.background is Background.SYSTEM:
+        return Background.DARK if theme.is_dark() else Background.LIGHT
+    return view.background
 
 
 def _label(deformation: Deformation, *, is_selected: bool) -> Label:

@@ -37,6 +37,8 @@ class FakeScene(FakeView):
         super().__init__()
         self.standard_views: list[str] = []
 
+    shades_edges = False
+
     def set_standard_view(self, name: str) -> None:
         self.standard_views.append(name)
 

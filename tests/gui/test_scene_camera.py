@@ -158,9 +158,9 @@ def test_that_the_front_surface_is_picked_and_on_it_the_nearest_to_the_cursor(po
     xyz = np.stack(
         [back, front + 3 * pixel * pose.right, front + 2 * pixel * pose.up + pixel * pose.forward]
     )
-    assert pick_point(xyz, projection, (400.0, 300.0)) == 2
-    assert pick_point(xyz[:1], projection, (400.0, 300.0)) == 0
-    assert pick_point(xyz, projection, (400.0, 300.0 + 2 * PICK_RADIUS_PX)) == -1
+    assert pick_point([xyz], projection, (400.0, 300.0)) == 2
+    assert pick_point([xyz[:1]], projection, (400.0, 300.0)) == 0
+    assert pick_point([xyz], projection, (400.0, 300.0 + 2 * PICK_RADIUS_PX)) == -1
 
 
 # Aiming

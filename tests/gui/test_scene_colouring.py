@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from pipegui.colour_maps import DEVIATION, QUALITATIVE, deviation_colours
-from pipegui.document import ColourBy, ViewOptions
-from pipegui.scene.colouring import MUTED, colour_points, effective, visible_points
+from pipegui.colour_maps import DEVIATION, KINDS, QUALITATIVE, deviation_colours, rgb
+from pipegui.colours import VERDICT
+from pipegui.document import Box, ColourBy, ViewOptions
+from pipegui.scene.colouring import MUTED, SOUND, colour_points, effective, visible_points
 from pipegui.scene.legend import make_legend
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
+from pipegui.scene.spreading import Spread
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()
@@ -98,11 +100,11 @@ def test_that_a_colouring_falls_back_on_what_the_cloud_has():
 
 
 def test_that_a_hidden_element_has_no_visible_points():
-    visible = visible_points(RESULT, frozenset({2, 7}))
+    visible = visible_points(CLOUD, RESULT, frozenset({2, 7}))
     assert np.array_equal(visible, ~np.isin(RESULT.element_id, (2, 7)))
-    assert visible_points(RESULT, frozenset()) is None
+    assert visible_points(CLOUD, RESULT, frozenset()) is None
     # Ids that a new result no longer has hide nothing.
-    assert visible_points(RESULT, frozenset({999})).all()
+    assert visible_points(CLOUD, RESULT, frozenset({999})).all()
 
 
 def test_that_the_deviation_legend_names_both_limits_in_mm():
@@ -146,3 +148,84 @@ def test_that_neighbours_never_share_a_colour_where_there_are_enough(rng):
     colour = colour_apart(n, pairs, n_colours)
     assert (colour[pairs[:, 0]] != colour[pairs[:, 1]]).all()
     assert set(colour[1:]) == set(range(n_colours))
+
+
+def test_that_deformed_stretches_have_the_colour_of_their_verdict_and_sound_pipes_none():
+    colours = colours_by(ColourBy.VERDICT)
+    worst = RESULT.deformation(1)  # to reject
+    near = np.linalg.norm(CLOUD.xyz - worst.peak, axis=1) < 0.03
+    near &= RESULT.element_id == worst.element_id
+    assert near.sum() > 10
+    assert (colours[near] == rgb(VERDICT[worst.verdict])).all()
+    deformed = {d.element_id for d in RESULT.deformations}
+    sound = ~np.isin(RESULT.element_id, [*deformed, 0])
+    assert (colours[sound] == SOUND).all()
+    texts = [text for _, text in make_legend(CLOUD, RESULT, by(ColourBy.VERDICT)).swatches]
+    assert texts == ["Reject", "Review", "No deformation"]
+
+
+def by(colour_by):
+    return ViewOptions(colour_by=colour_by)
+
+
+@pytest.mark.parametrize("colour_by", list(ColourBy))
+def test_that_some_rows_have_the_colours_they_have_among_all(colour_by, rng):
+    rows = rng.integers(0, len(CLOUD), 500)
+    view = ViewOptions(colour_by=colour_by, shown_stack=1)
+    some = colour_points(CLOUD, RESULT, view, rows=rows)
+    assert np.array_equal(some, colour_points(CLOUD, RESULT, view)[rows])
+
+
+COLOUR_BLIND = {
+    "protan": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deutan": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritan": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+"""What colour-blind people see of linear RGB (Machado and others 2009, severity 1)."""
+
+
+def lab_seen(colours, matrix):
+    channels = np.asarray(colours) / 255
+    low = channels <= 0.04045
+    linear = np.where(low, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.array(matrix).T, 0, 1)
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    xyz = seen @ np.array(to_xyz).T / [0.9505, 1.0, 1.089]
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16 / 116)
+    x, y, z = f.T
+    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=1)
+
+
+@pytest.mark.parametrize("kind_of_sight", COLOUR_BLIND)
+def test_that_colour_blind_people_tell_kinds_and_verdicts_apart(kind_of_sight):
+    verdicts = [rgb(c) for c in VERDICT.values()]
+    for colours in (KINDS, np.array(verdicts)):
+        lab = lab_seen(colours, COLOUR_BLIND[kind_of_sight])
+        distance = np.linalg.norm(lab[:, None] - lab[None], axis=2)
+        assert distance[~np.eye(len(lab), dtype=bool)].min() > 8  # 2.3 is just noticeable
+
+
+def test_that_points_outside_the_box_are_not_visible():
+    box = Box((0.5, 0.2, 0.1), (1.5, 1.6, 1.0))
+    visible = visible_points(CLOUD, RESULT, frozenset({2}), box)
+    inside = np.all((CLOUD.xyz >= box.low) & (CLOUD.xyz <= box.high), axis=1)
+    assert np.array_equal(visible, inside & (RESULT.element_id != 2))
+
+
+@pytest.mark.parametrize("n", [1, 7, 8192, 20_001, 1_000_003])
+def test_that_spreading_is_a_permutation_whichever_way_it_is_asked_for(n):
+    spread = Spread(n)
+    whole = spread.rows(0, n)
+    assert np.array_equal(np.sort(whole), np.arange(n))
+    cut = n // 3
+    parts = [spread.rows(0, cut), spread.rows(cut, n + 10)]
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_that_the_first_points_are_spread_over_all_of_the_cloud():
+    first = Spread(5_000_000).rows(0, 25_000)
+    counts, _ = np.histogram(first, bins=100, range=(0, 5_000_000))
+    assert counts.min() > 200
+    assert counts.max() < 300
+    # Not every so manieth: that would show as stripes in a scan's rows.
+    assert len(np.unique(np.diff(np.sort(first)))) > 500

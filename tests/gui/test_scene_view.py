@@ -8,7 +8,16 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
-from pipegui.document import ColourBy, Document, Scan, Selection, ViewOptions
+from pipegui.document import (
+    Background,
+    Box,
+    ColourBy,
+    Document,
+    Scan,
+    Selection,
+    ViewOptions,
+)
+from pipegui.scene import pose as poses
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import make_scan
@@ -95,11 +104,11 @@ def test_that_a_click_beside_everything_picks_nothing(scene, qtbot):
 
 def test_that_points_of_hidden_elements_are_neither_drawn_nor_picked(scene, qtbot):
     (index, *_) = seen_points(scene, 2)
-    n_before = len(scene.points.xyz)
+    n_before = len(scene.points)
     position = on_screen(scene, index)
     scene.apply(scene_state(view=replace(STILL, hidden_elements=frozenset({2}))))
     settle(qtbot, scene)
-    assert len(scene.points.xyz) == n_before - (RESULT.element_id == 2).sum()
+    assert len(scene.points) == n_before - (RESULT.element_id == 2).sum()
     with qtbot.waitSignal(scene.picked) as picked:
         qtbot.mouseClick(scene.canvas, LEFT, pos=position)
     assert picked.args[0] != index
@@ -222,7 +231,7 @@ def test_that_hovering_tells_the_element_under_the_cursor(scene, qtbot):
 
 def test_that_only_what_differs_is_done_anew(scene, qtbot, monkeypatch):
     counted = []
-    for name in ("set_cloud", "set_points", "set_colours"):
+    for name in ("set_points", "set_colours"):
         monkeypatch.setattr(scene.points, name, lambda *_, name=name: counted.append(name))
     scene.apply(scene_state(Selection(1, 2)))
     scene.apply(scene_state(Selection(1, 3)))
@@ -259,3 +268,87 @@ def test_that_closing_the_scan_empties_the_view(scene, qtbot):
     assert scene.points.n_shown == 0
     colours = picture(scene)[:, :, 0]
     assert np.ptp(colours[:300, 100:]) < 30
+
+
+# Ways to look
+
+
+@pytest.mark.parametrize("name", ["top", "iso", "back"])
+def test_that_picking_and_zooming_are_as_exact_without_perspective(scene, qtbot, name):
+    scene.apply(scene_state(view=replace(STILL, is_parallel=True)))
+    scene.set_standard_view(name)
+    settle(qtbot, scene)
+    (index, *_) = seen_points(scene, 7)
+    at = on_screen(scene, index)
+    with qtbot.waitSignal(scene.picked) as picked:
+        qtbot.mouseClick(scene.canvas, LEFT, pos=at)
+    assert picked.args == [index]
+    scene.canvas.move_to(poses.zoom(scene.canvas.pose, 0.5, CLOUD.xyz[index].astype(float)))
+    assert (on_screen(scene, index) - at).manhattanLength() <= 2
+
+
+def test_that_equal_lengths_look_equal_without_perspective(scene, qtbot):
+    scene.apply(scene_state(view=replace(STILL, is_parallel=True)))
+    settle(qtbot, scene)
+    projection, pose = scene.canvas.projection(), scene.canvas.pose
+    lengths = []
+    for depth in (-1.0, 0.0, 1.0):
+        start = pose.focus + depth * pose.forward
+        pixels, _ = projection.to_screen(np.stack([start, start + 0.3 * pose.right]))
+        lengths.append(np.linalg.norm(pixels[1] - pixels[0]))
+    assert lengths == pytest.approx([lengths[0]] * 3)
+    assert 0.3 / lengths[0] == pytest.approx(projection.pixel_size(pose.distance))
+    # Everything is drawn, also what would lie behind the eye from so near.
+    scene.canvas.move_to(replace(pose, distance=0.3))
+    settle(qtbot, scene)
+    colours = picture(scene)
+    assert (np.abs(colours - colours[2, 2]).max(axis=2) > 25).mean() > 0.02
+
+
+@pytest.mark.parametrize(
+    ("background", "brightness"),
+    [(Background.WHITE, 255), (Background.BLACK, 0), (Background.LIGHT, 245)],
+)
+def test_that_the_background_is_as_chosen(scene, qtbot, background, brightness):
+    scene.apply(scene_state(view=replace(STILL, background=background)))
+    settle(qtbot, scene)
+    assert picture(scene)[2, 2] == pytest.approx([brightness] * 3, abs=8)
+
+
+def test_that_points_are_drawn_larger_where_asked_for(scene, qtbot):
+    def n_covered():
+        settle(qtbot, scene)
+        colours = picture(scene)
+        return (np.abs(colours - colours[2, 2]).max(axis=2) > 25).sum()
+
+    usual = n_covered()
+    scene.apply(scene_state(view=replace(STILL, point_size=2.2)))
+    assert n_covered() > 1.3 * usual
+
+
+def test_that_edges_are_shaded_only_where_asked_for_on_software(scene, qtbot):
+    if not scene.canvas.is_software:
+        pytest.skip("there is a graphics card")
+    before = picture(scene)
+    assert not scene.shades_edges
+    scene.apply(scene_state(view=replace(STILL, eye_dome=True)))
+    settle(qtbot, scene)
+    shaded = picture(scene)
+    darker = (before.sum(axis=2) - shaded.sum(axis=2)) > 40
+    assert darker.mean() > 0.01
+    scene.apply(scene_state(view=replace(STILL, eye_dome=False)))
+    settle(qtbot, scene)
+    assert np.abs(picture(scene) - before).mean() < 1
+
+
+def test_that_points_outside_the_clip_box_are_neither_drawn_nor_picked(scene, qtbot):
+    (index, *_) = seen_points(scene, 2)
+    position = on_screen(scene, index)
+    x = float(CLOUD.xyz[index, 0])
+    box = Box((x + 0.05, -1.0, -1.0), (5.0, 5.0, 5.0))
+    scene.apply(scene_state(view=replace(STILL, clip_box=box)))
+    settle(qtbot, scene)
+    assert len(scene.points) == (CLOUD.xyz[:, 0] >= x + 0.05).sum()
+    with qtbot.waitSignal(scene.picked) as picked:
+        qtbot.mouseClick(scene.canvas, LEFT, pos=position)
+    assert picked.args[0] != index

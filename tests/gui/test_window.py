@@ -3,6 +3,7 @@
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QMimeData, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
@@ -11,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
 from pipegui.actions import SPECS
-from pipegui.document import ColourBy, ProfileKey, Selection
+from pipegui.document import Background, ColourBy, ProfileKey, Selection
 from tests.factories import make_cloud, make_result
 
 LEFT = Qt.MouseButton.LeftButton
@@ -223,6 +224,34 @@ def test_that_keys_and_menus_change_the_view(detected, qtbot):
     key(qtbot, detected, Qt.Key.Key_7)
     key(qtbot, detected, Qt.Key.Key_F)
     assert detected.parts.scene.standard_views == ["top", "fit"]
+
+
+def test_that_the_view_is_changed_by_menus_and_keys(detected, qtbot):
+    view = detected.parts.scene
+    qtbot.keyClick(detected, Qt.Key.Key_7, CTRL)
+    assert view.standard_views == ["bottom"]
+    key(qtbot, detected, Qt.Key.Key_5)
+    assert view.state.view.is_parallel
+    key(qtbot, detected, Qt.Key.Key_Plus)
+    key(qtbot, detected, Qt.Key.Key_Plus)
+    key(qtbot, detected, Qt.Key.Key_Minus)
+    assert view.state.view.point_size == 1.3
+    detected.actions_["background_black"].trigger()
+    assert view.state.view.background is Background.BLACK
+    chosen = [
+        b for b in Background if detected.actions_[f"background_{b.name.lower()}"].isChecked()
+    ]
+    assert chosen == [Background.BLACK]
+    detected.actions_["eye_dome"].trigger()
+    assert view.state.view.eye_dome
+
+
+def test_that_limits_are_fitted_to_the_deviations(detected):
+    detected.actions_["fit_limits"].trigger()
+    limit = detected.parts.scene.state.view.deviation_limit_mm
+    deviation = detected.document.result.deviation
+    within = np.abs(deviation[np.isfinite(deviation)]) <= limit / 1000
+    assert 0.98 <= within.mean() <= 0.995
 
 
 # Undo
