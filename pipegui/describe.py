@@ -21,6 +21,7 @@ from pipecore.rules import outside_diameter
 from pipecore.types import (
     NO_ID,
     Deformation,
+    DeformationKind,
     Element,
     ElementKind,
     PointCloud,
@@ -33,6 +34,7 @@ from pipegui.document import Scan, Selection
 from pipegui.view_state import PropertiesState
 
 ARC_TOO_SHORT = "The scan sees {arc:.0f}° of the circumference: too little to carry this number."
+INTERACTS = "Closer than one outside diameter: judge the two as one."
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,9 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
         element.ovality,
         element.ovality_sd,
         unit="%",
-        hint="(Dmax − Dmin) / Dnom" if math.isfinite(element.ovality) else too_short,
+        hint="(Dmax − Dmin) / Dnom"
+        if math.isfinite(element.ovality)
+        else element.not_measurable.get("ovality", too_short),
     )
     off_axis = "Largest distance of the measured axis from the fitted one."
     yield _measure("Straightness", element.straightness, hint=off_axis)
@@ -227,11 +231,35 @@ def _of_deformation(
     yield _measure("Chainage", deformation.chainage, unit="m")
     clock = format_clock(deformation.clock)
     yield Property("Clock", clock, clock, hint="Looking along increasing chainage, 12:00 up.")
-    if deformation.kind.value == "ovality":
-        yield _measure("Ovality", deformation.ovality, unit="%", hint="(Dmax − Dmin) / Dnom")
+    why = deformation.not_measurable
+    if deformation.kind is DeformationKind.OVALITY:
+        hint = why.get("ovality", "(Dmax − Dmin) / Dnom")
+        yield _measure("Ovality", deformation.ovality, unit="%", hint=hint)
+    if math.isfinite(deformation.area):
+        area, volume = 1e4 * deformation.area, 1e6 * deformation.volume
+        yield Property("Area", f"{area:.0f} cm²", cell(area, 1), "Of the undented surface.")
+        yield Property("Volume", f"{volume:.1f} cm³", cell(volume, 2), "Between both surfaces.")
     if math.isfinite(deformation.strain):
         yield _measure("Strain", deformation.strain, unit="%", hint="Indicative only.")
+    elif "strain" in why:
+        yield _measure("Strain", math.nan, unit="%", hint=why["strain"])
+    yield from _surroundings(deformation, result)
     yield _position("Peak", deformation.peak + result.origin)
+
+
+def _surroundings(deformation: Deformation, result: Result) -> Iterator[Property]:
+    # Either may have been deleted since.
+    fitting = next((e for e in result.elements if e.element_id == deformation.fitting_id), None)
+    other = next((d for d in result.deformations if d.deformation_id == deformation.next_id), None)
+    if fitting is not None:
+        is_on = deformation.fitting_id == deformation.element_id
+        place = "on it" if is_on else f"{deformation.fitting_distance:.3f} m"
+        distance = f"{deformation.fitting_distance:.4f}"
+        yield Property("Nearest fitting", f"{fitting.label}, {place}", distance)
+    if other is not None:
+        text = f"{other.kind} {other.deformation_id}, {deformation.next_distance:.3f} m"
+        text, hint = (f"{text}, interacts", INTERACTS) if deformation.interacts else (text, "")
+        yield Property("Next dent", text, f"{deformation.next_distance:.4f}", hint)
 
 
 def _of_profile(profile: Profiles, result: Result) -> Iterator[Property]:

@@ -67,6 +67,12 @@ def connect_panels(window: "MainWindow") -> None:
     panels.tree.chosen.connect(window.choose_in_tree)
     panels.tree.visibility_changed.connect(lambda ids, hide: do(commands.set_hidden, ids, hide))
     panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
+    panels.table.reviewed.connect(lambda ids, state: do(commands.set_review, ids, state))
+    panels.table.commented.connect(lambda i, text: do(commands.set_comment, i, text))
+    panels.table.show_columns(str(window.stored.value("table/columns", "")).split())
+    panels.table.columns_changed.connect(
+        lambda keys: window.stored.setValue("table/columns", " ".join(keys))
+    )
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
     panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
     panels.stacks.preset_chosen.connect(lambda preset: do(commands.set_preset, preset))

@@ -1,8 +1,8 @@
 """The deformations as a table model, and the proxy that sorts and filters it."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from math import isfinite, isnan
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isnan
 from typing import Any
 
 from PySide6.QtCore import (
@@ -12,144 +12,76 @@ from PySide6.QtCore import (
     QPersistentModelIndex,
     QSortFilterProxyModel,
     Qt,
+    Signal,
 )
 
-from pipecore.report.format import NOT_MEASURABLE, cell, format_clock, format_measure
-from pipecore.report.summary import VERDICT_ORDER, by_verdict
-from pipecore.rules import outside_diameter
-from pipecore.types import Deformation, DeformationKind, Element, Result, Verdict
+from pipecore.report.format import NOT_MEASURABLE
+from pipecore.report.summary import by_verdict
+from pipecore.types import Deformation, DeformationKind, Result, Review, ReviewState, Verdict
 from pipegui import theme
+from pipegui.panels.deformation_columns import COLUMNS, INDEX, Row
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
-SORT_ROLE = int(Role.UserRole)
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column: how its cells read, are copied and are sorted."""
-
-    title: str
-    copied_title: str
-    text: Callable[[Deformation, Element], str]
-    plain: Callable[[Deformation, Element], str]
-    sort_key: Callable[[Deformation, Element], Any]
-    hint: str = ""
-    is_text: bool = False
-
-
-def _number(
-    title: str,
-    copied_title: str,
-    value: Callable[[Deformation, Element], float],
-    decimals: int,
-    hint: str = "",
-) -> Column:
-    return Column(
-        title,
-        copied_title,
-        lambda d, e: format_measure(value(d, e), decimals=decimals),
-        lambda d, e: cell(value(d, e), decimals),
-        value,
-        hint,
-    )
-
-
-def _depth_pct(deformation: Deformation, element: Element) -> float:
-    return 100 * deformation.depth / outside_diameter(element)
-
-
-COLUMNS = (
-    _number("#", "deformation_id", lambda d, e: d.deformation_id, 0),
-    Column(
-        "Element",
-        "element",
-        lambda d, e: e.label,
-        lambda d, e: e.label,
-        lambda d, e: e.element_id,
-        is_text=True,
-    ),
-    Column(
-        "Kind",
-        "kind",
-        lambda d, e: str(d.kind),
-        lambda d, e: str(d.kind),
-        lambda d, e: str(d.kind),
-        is_text=True,
-    ),
-    Column(
-        "Clock",
-        "clock",
-        lambda d, e: format_clock(d.clock),
-        lambda d, e: format_clock(d.clock),
-        lambda d, e: d.clock,
-        "Looking along increasing chainage, 12:00 up; on a vertical pipe 12:00 is grid north.",
-    ),
-    _number("Chainage, m", "chainage_m", lambda d, e: d.chainage, 3, "From the element’s start"),
-    Column(
-        "Depth, mm",
-        "depth_mm",
-        lambda d, e: format_measure(1000 * d.depth, 1000 * d.depth_sd),
-        lambda d, e: cell(1000 * d.depth, 2),
-        lambda d, e: d.depth,
-        "Gap to the undented contour, ± one standard deviation",
-    ),
-    _number("% OD", "depth_pct_od", _depth_pct, 1, "Depth in percent of the outside diameter"),
-    _number("Length, mm", "length_mm", lambda d, e: 1000 * d.length, 0, "Along the axis"),
-    _number("Width, mm", "width_mm", lambda d, e: 1000 * d.width, 0, "Around the circumference"),
-    Column(
-        "Ovality, %",
-        "ovality_pct",
-        # Only ovality has one: elsewhere the cell does not apply, which is not "not measurable".
-        lambda d, e: (
-            format_measure(100 * d.ovality, decimals=2)
-            if d.kind is DeformationKind.OVALITY or isfinite(d.ovality)
-            else ""
-        ),
-        lambda d, e: cell(100 * d.ovality, 2),
-        lambda d, e: d.ovality,
-        "(Dmax − Dmin) / Dnom",
-    ),
-    Column(
-        "Verdict",
-        "verdict",
-        lambda d, e: str(d.verdict),
-        lambda d, e: str(d.verdict),
-        lambda d, e: (VERDICT_ORDER.index(d.verdict), -d.depth),
-        is_text=True,
-    ),
-)
-VERDICT_COLUMN = next(i for i, c in enumerate(COLUMNS) if c.title == "Verdict")
+VERDICT_COLUMN, REVIEW_COLUMN, COMMENT_COLUMN = (INDEX[k] for k in ("verdict", "review", "comment"))
+REVIEW_ICON = {
+    ReviewState.OPEN: "circle-outline",
+    ReviewState.ACCEPTED: "check",
+    ReviewState.REJECTED: "close-thick",
+}
 
 
 class DeformationModel(QAbstractTableModel):
-    """The deformations of a result, the worst first."""
+    """The deformations of a result, the worst first; what a person edits is told as a signal."""
+
+    reviewed = Signal(int, object)
+    """Id of the deformation and its `ReviewState`."""
+    commented = Signal(int, str)
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._rows: list[tuple[Deformation, Element]] = []
+        self._rows: list[Row] = []
 
-    def set_result(self, result: Result | None) -> None:
+    def set_result(self, result: Result | None, reviews: Mapping[int, Review] = {}) -> None:
         """Show the deformations of a result."""
         self.beginResetModel()
         self._rows = (
-            [(d, result.element(d.element_id)) for d in by_verdict(result)] if result else []
+            [Row(d, result.element(d.element_id), result) for d in by_verdict(result)]
+            if result
+            else []
         )
+        self._review(reviews)
         self.endResetModel()
+
+    def set_reviews(self, reviews: Mapping[int, Review]) -> None:
+        """Show what a person said of the deformations."""
+        self._review(reviews)
+        if self._rows:
+            first = self.index(0, REVIEW_COLUMN)
+            self.dataChanged.emit(first, self.index(len(self._rows) - 1, COMMENT_COLUMN))
+
+    def _review(self, reviews: Mapping[int, Review]) -> None:
+        self._rows = [
+            replace(row, review=reviews.get(row.deformation.deformation_id, Review()))
+            for row in self._rows
+        ]
 
     def deformation(self, row: int) -> Deformation:
         """Return the deformation in a row."""
-        return self._rows[row][0]
+        return self._rows[row].deformation
+
+    def review(self, row: int) -> Review:
+        """Return what a person said of the deformation in a row."""
+        return self._rows[row].review
 
     def row_of(self, deformation_id: int) -> int:
         """Return the row of a deformation, -1 if it has none."""
-        return next(
-            (i for i, (d, _) in enumerate(self._rows) if d.deformation_id == deformation_id), -1
-        )
+        rows = enumerate(self._rows)
+        return next((i for i, r in rows if r.deformation.deformation_id == deformation_id), -1)
 
     def plain(self, row: int, column: int) -> str:
         """Return a cell as it is copied."""
-        return COLUMNS[column].plain(*self._rows[row])
+        return COLUMNS[column].plain(self._rows[row])
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
         """Return the number of deformations."""
@@ -179,33 +111,66 @@ class DeformationModel(QAbstractTableModel):
         side = Qt.AlignmentFlag.AlignLeft if is_text else Qt.AlignmentFlag.AlignRight
         return side | Qt.AlignmentFlag.AlignVCenter
 
+    def flags(self, index: Index) -> Qt.ItemFlag:
+        """Let review and comment be edited."""
+        flags = super().flags(index)
+        if index.isValid() and index.column() in (REVIEW_COLUMN, COMMENT_COLUMN):
+            flags |= Qt.ItemFlag.ItemIsEditable
+        return flags
+
     def data(self, index: Index, role: int = Role.DisplayRole) -> Any:
         """Return what is shown of a cell."""
         if not index.isValid():
             return None
-        deformation, element = self._rows[index.row()]
-        column = COLUMNS[index.column()]
-        text = column.text(deformation, element)
-        is_verdict = index.column() == VERDICT_COLUMN
+        row, column = self._rows[index.row()], COLUMNS[index.column()]
+        text = column.text(row)
         value: Any = None
         match role:
-            case Role.DisplayRole:
+            case Role.DisplayRole | Role.EditRole:
                 value = text
             case Role.TextAlignmentRole:
                 value = self._alignment(index.column())
-            case Role.DecorationRole if is_verdict:
-                value = theme.verdict_icon(deformation.verdict)
-            case Role.ForegroundRole if text == NOT_MEASURABLE:
+            case Role.DecorationRole:
+                value = self._icon(row, index.column())
+            case Role.ForegroundRole if text == NOT_MEASURABLE or self._is_faint(row, index):
                 value = theme.colour("muted")
-            case Role.ToolTipRole if is_verdict and deformation.rule:
-                value = f"By the rule “{deformation.rule}”"
-            case Role.ToolTipRole if text == NOT_MEASURABLE:
-                value = "The scan does not carry this number: its arc is too short, or too noisy."
+            case Role.ToolTipRole:
+                value = self._hint(row, index.column(), text)
         return value
+
+    def _icon(self, row: Row, column: int) -> Any:
+        if column == VERDICT_COLUMN:
+            return theme.verdict_icon(row.deformation.verdict)
+        if column == REVIEW_COLUMN:
+            is_open = row.review.state is ReviewState.OPEN
+            return theme.icon(REVIEW_ICON[row.review.state], "muted" if is_open else "")
+        return None
+
+    def _is_faint(self, row: Row, index: Index) -> bool:
+        return index.column() == REVIEW_COLUMN and row.review.state is ReviewState.OPEN
+
+    def _hint(self, row: Row, column: int, text: str) -> str | None:
+        if text == NOT_MEASURABLE:
+            return COLUMNS[column].why_not(row)
+        if column == VERDICT_COLUMN and row.deformation.rule:
+            return f"By the rule “{row.deformation.rule}”"
+        return COLUMNS[column].hint or (text if column == COMMENT_COLUMN else None)
+
+    def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
+        """Tell what a person decided or wrote; the cell shows it once the document holds it."""
+        if role != Role.EditRole or not self.flags(index) & Qt.ItemFlag.ItemIsEditable:
+            return False
+        row = self._rows[index.row()]
+        deformation_id = row.deformation.deformation_id
+        if index.column() == COMMENT_COLUMN and str(value).strip() != row.review.comment:
+            self.commented.emit(deformation_id, str(value))
+        elif index.column() == REVIEW_COLUMN and ReviewState(value) is not row.review.state:
+            self.reviewed.emit(deformation_id, ReviewState(value))
+        return True
 
     def sort_key(self, row: int, column: int) -> Any:
         """Return what a cell is sorted by."""
-        return COLUMNS[column].sort_key(*self._rows[row])
+        return COLUMNS[column].sort_key(self._rows[row])
 
 
 class DeformationFilter(QSortFilterProxyModel):
@@ -216,12 +181,18 @@ class DeformationFilter(QSortFilterProxyModel):
         self.kind: DeformationKind | None = None
         self.verdict: Verdict | None = None
         self.min_depth_mm = 0.0
+        self.state: ReviewState | None = None
 
     def set_filter(
-        self, kind: DeformationKind | None, verdict: Verdict | None, min_depth_mm: float
+        self,
+        kind: DeformationKind | None,
+        verdict: Verdict | None,
+        min_depth_mm: float,
+        state: ReviewState | None = None,
     ) -> None:
-        """Show only what is of this kind and verdict (None: any) and at least this deep."""
+        """Show only what is of this kind, verdict and state (None: any), at least this deep."""
         self.kind, self.verdict, self.min_depth_mm = kind, verdict, min_depth_mm
+        self.state = state
         self.invalidate()
 
     def filterAcceptsRow(self, source_row: int, source_parent: Index) -> bool:  # noqa: N802
@@ -230,6 +201,7 @@ class DeformationFilter(QSortFilterProxyModel):
         return (
             self.kind in (None, deformation.kind)
             and self.verdict in (None, deformation.verdict)
+            and self.state in (None, self.sourceModel().review(source_row).state)
             # Without a depth a deformation is rather shown than overlooked.
             and not bool(1000 * deformation.depth < self.min_depth_mm)
         )

@@ -10,7 +10,8 @@ from pipecore.settings import DirectionPreset, Settings, iterate_fields
 from pipecore.types import DeformationKind, Verdict
 from pipegui import commands
 from pipegui.document import Document
-from pipegui.panels.deformation_model import COLUMNS, DeformationFilter, DeformationModel
+from pipegui.panels.deformation_columns import COLUMNS
+from pipegui.panels.deformation_model import DeformationFilter, DeformationModel
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.panels.project_model import BADGE, NAME, RADIUS, NodeKind, ProjectModel
 from pipegui.panels.project_tree import ProjectTree
@@ -206,12 +207,12 @@ def test_that_the_filters_leave_out_and_count(qtbot):
     table.apply(TableState(make_result()))
     assert table.counts.text() == "4 shown · 1 to reject · 3 to review"
     qtbot.keyClicks(table.kind, "dent")
-    assert table.counts.text() == "2 shown · 1 to reject · 1 to review"
+    assert table.counts.text() == "2 of 4 shown · 1 to reject · 1 to review"
     table.min_depth.setFocus()
     table.min_depth.selectAll()
     qtbot.keyClicks(table.min_depth, "10")
     qtbot.keyClick(table.min_depth, Qt.Key.Key_Return)
-    assert table.counts.text() == "1 shown · 1 to reject"
+    assert table.counts.text() == "1 of 4 shown · 1 to reject"
 
 
 def test_that_a_click_on_a_row_tells_its_deformation(qtbot):
@@ -259,7 +260,7 @@ def test_that_properties_carry_unit_and_uncertainty(qtbot, document):
     panel.apply(resolve(commands.select_element(document, 9)).properties)
     ovality = panel.list.findItems("Ovality", Qt.MatchFlag.MatchExactly, 0)[0]
     assert ovality.text(1) == "not measurable"
-    assert "140°" in ovality.toolTip(1)
+    assert "140° of arc" in ovality.toolTip(1)
 
 
 # Settings

@@ -1,0 +1,273 @@
+"""The deformation table's columns: how cells read, are copied and sorted. Qt-free."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from pipecore.geometry import Array
+from pipecore.report.format import (
+    cell,
+    format_clock,
+    format_coordinate,
+    format_measure,
+)
+from pipecore.report.summary import VERDICT_ORDER
+from pipecore.rules import outside_diameter
+from pipecore.types import Deformation, Element, Result, Review, ReviewState
+
+REVIEW_ORDER = tuple(ReviewState)
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """What the cells of a row are made of."""
+
+    deformation: Deformation
+    element: Element
+    result: Result
+    review: Review = Review()
+
+    @property
+    def peak(self) -> Array:
+        """World coordinates of the peak."""
+        return self.deformation.peak + self.result.origin
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column; `field` is the deformation's field that it shows, if it is one that can be nan."""
+
+    key: str
+    title: str
+    text: Callable[[Row], str]
+    plain: Callable[[Row], str]
+    sort_key: Callable[[Row], Any]
+    hint: str = ""
+    is_text: bool = False
+    is_shown_first: bool = True
+    field: str = ""
+
+    @property
+    def copied_title(self) -> str:
+        """What stands above the cells in a spreadsheet, as in the CSV table."""
+        return self.key
+
+    def why_not(self, row: Row) -> str:
+        """Why a cell holds no number."""
+        default = "The scan does not carry this number: its arc is too short, or too noisy."
+        return row.deformation.not_measurable.get(self.field, default)
+
+
+def _number(
+    key: str,
+    title: str,
+    value: Callable[[Row], float],
+    decimals: int,
+    hint: str = "",
+    *,
+    field: str = "",
+    is_shown_first: bool = True,
+) -> Column:
+    """A column of numbers; empty where the deformation's kind has no such number."""
+
+    def text(row: Row) -> str:
+        number = value(row)
+        does_apply = isfinite(number) or not field or field in row.deformation.not_measurable
+        return format_measure(number, decimals=decimals) if does_apply else ""
+
+    return Column(
+        key,
+        title,
+        text,
+        lambda row: cell(value(row), decimals),
+        value,
+        hint,
+        field=field,
+        is_shown_first=is_shown_first,
+    )
+
+
+def _text(
+    key: str,
+    title: str,
+    text: Callable[[Row], str],
+    sort_key: Callable[[Row], Any] | None = None,
+    hint: str = "",
+    *,
+    is_shown_first: bool = True,
+) -> Column:
+    return Column(
+        key,
+        title,
+        text,
+        text,
+        sort_key or (lambda row: text(row).casefold()),
+        hint,
+        is_text=True,
+        is_shown_first=is_shown_first,
+    )
+
+
+def _coordinate(key: str, title: str, axis: int) -> Column:
+    return Column(
+        key,
+        title,
+        lambda row: format_coordinate(float(row.peak[axis])),
+        lambda row: cell(float(row.peak[axis]), 4),
+        lambda row: float(row.peak[axis]),
+        "Of the peak, in the coordinates of the scan",
+        is_shown_first=False,
+    )
+
+
+def _fitting(row: Row) -> str:
+    wanted = row.deformation.fitting_id
+    fitting = next((e for e in row.result.elements if e.element_id == wanted), None)
+    if fitting is None:  # there is none, or it was deleted since
+        return ""
+    if fitting.element_id == row.element.element_id:
+        return f"on {fitting.label}"
+    return f"{fitting.label}: {row.deformation.fitting_distance:.2f} m"
+
+
+def _neighbour(row: Row) -> str:
+    if not row.deformation.next_id:
+        return ""
+    text = f"{row.deformation.next_id}: {row.deformation.next_distance:.2f} m"
+    return f"{text}, interacts" if row.deformation.interacts else text
+
+
+COLUMNS = (
+    _number("deformation_id", "#", lambda r: r.deformation.deformation_id, 0),
+    _text("element", "Element", lambda r: r.element.label, lambda r: r.element.element_id),
+    _text("kind", "Kind", lambda r: str(r.deformation.kind)),
+    Column(
+        "clock",
+        "Clock",
+        lambda r: format_clock(r.deformation.clock),
+        lambda r: format_clock(r.deformation.clock),
+        lambda r: r.deformation.clock,
+        "Looking along increasing chainage, 12:00 up; on a vertical pipe 12:00 is grid north.",
+    ),
+    _number(
+        "chainage_m",
+        "Chainage, m",
+        lambda r: r.deformation.chainage,
+        3,
+        "From the element’s start",
+    ),
+    Column(
+        "depth_mm",
+        "Depth, mm",
+        lambda r: format_measure(1000 * r.deformation.depth, 1000 * r.deformation.depth_sd),
+        lambda r: cell(1000 * r.deformation.depth, 2),
+        lambda r: r.deformation.depth,
+        "Gap to the undented contour, ± one standard deviation",
+        field="depth",
+    ),
+    _number(
+        "depth_pct_od",
+        "% OD",
+        lambda r: 100 * r.deformation.depth / outside_diameter(r.element),
+        1,
+        "Depth in percent of the outside diameter",
+    ),
+    _number("length_mm", "Length, mm", lambda r: 1000 * r.deformation.length, 0, "Along the axis"),
+    _number(
+        "width_mm",
+        "Width, mm",
+        lambda r: 1000 * r.deformation.width,
+        0,
+        "Around the circumference",
+    ),
+    _number(
+        "ovality_pct",
+        "Ovality, %",
+        lambda r: 100 * r.deformation.ovality,
+        2,
+        "(Dmax − Dmin) / Dnom",
+        field="ovality",
+    ),
+    _number(
+        "area_cm2",
+        "Area, cm²",
+        lambda r: 1e4 * r.deformation.area,
+        0,
+        "What a dent or bulge covers of the undented surface",
+        field="area",
+        is_shown_first=False,
+    ),
+    _number(
+        "volume_cm3",
+        "Volume, cm³",
+        lambda r: 1e6 * r.deformation.volume,
+        1,
+        "Between the undented surface and the real one",
+        field="volume",
+        is_shown_first=False,
+    ),
+    _number(
+        "strain_pct",
+        "Strain, %",
+        lambda r: 100 * r.deformation.strain,
+        1,
+        "After ASME B31.8; indicative only. Needs the wall thickness.",
+        field="strain",
+        is_shown_first=False,
+    ),
+    Column(
+        "fitting",
+        "Nearest fitting",
+        _fitting,
+        _fitting,
+        lambda r: r.deformation.fitting_distance,
+        "The nearest flange, bend or other fitting, and how far it is along the run",
+        is_text=True,
+        is_shown_first=False,
+    ),
+    Column(
+        "next",
+        "Next dent",
+        _neighbour,
+        _neighbour,
+        lambda r: r.deformation.next_distance,
+        "The nearest other dent or bulge of the run. They interact within one outside diameter.",
+        is_text=True,
+        is_shown_first=False,
+    ),
+    _coordinate("peak_x", "X (E), m", 0),
+    _coordinate("peak_y", "Y (N), m", 1),
+    _coordinate("peak_z", "Z (H), m", 2),
+    _number(
+        "n_points", "Points", lambda r: r.deformation.n_points, 0, "In it", is_shown_first=False
+    ),
+    _text(
+        "verdict",
+        "Verdict",
+        lambda r: str(r.deformation.verdict),
+        lambda r: (VERDICT_ORDER.index(r.deformation.verdict), -r.deformation.depth),
+    ),
+    _text(
+        "rule",
+        "Rule",
+        lambda r: r.deformation.rule,
+        hint="The rule that gave the verdict",
+        is_shown_first=False,
+    ),
+    _text(
+        "review",
+        "Review",
+        lambda r: str(r.review.state),
+        lambda r: REVIEW_ORDER.index(r.review.state),
+        "What you decided. Double-click or F2 to change it.",
+    ),
+    _text(
+        "comment",
+        "Comment",
+        lambda r: r.review.comment,
+        hint="Your own words. Double-click or F2 to write.",
+    ),
+)
+INDEX = {column.key: i for i, column in enumerate(COLUMNS)}
+SHOWN_FIRST = tuple(column.key for column in COLUMNS if column.is_shown_first)
