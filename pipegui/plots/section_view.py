@@ -3,7 +3,7 @@
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QKeyEvent
+from PySide6.QtGui import QAction, QColor, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
@@ -21,6 +21,8 @@ EMPTY = "Select a profile to see its section: click a point of the radius plot o
 MAX_FACTOR = 20
 MAX_POINTS = 20_000
 HOVER_PX = 15
+ROOM_FOR_BOTH = 250
+"""Height in pixels below which the section stands alone."""
 CLOCK = (("12", 0, 1), ("3", 1, 0), ("6", 0, -1), ("9", -1, 0))
 HOURS = tuple((90.0 * i, text) for i, text in enumerate(("12:00", "3:00", "6:00", "9:00", "12:00")))
 STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Down: -1, Qt.Key.Key_Right: 1, Qt.Key.Key_Up: 1}
@@ -196,12 +198,24 @@ class SectionView(Chart):
             label.setPos(*(ends[0] + share * (ends[1] - ends[0])))
             self.plot.addItem(label)
 
-    def _draw_curvature(self, cut: SectionCut) -> None:
-        """Curvature times radius against the clock: 1 on a circle."""
-        is_shown = self._shows("curvature") and cut.curve is not None
+    def _give_room(self) -> bool:
+        """Show the curvature where it is wanted and leaves room for the section."""
+        cut = self._state.cut
+        is_wanted = self._shows("curvature") and cut is not None and cut.curve is not None
+        is_shown = is_wanted and self.canvas.height() >= ROOM_FOR_BOTH
         self.curvature.setVisible(is_shown)
         self.curvature.setMaximumHeight(16_777_215 if is_shown else 0)
-        if not is_shown:
+        return is_shown
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Leave the curvature out of a small panel."""
+        super().resizeEvent(event)
+        if self._state.cut is not None and self.curvature.isVisible() != self._give_room():
+            self._redraw()
+
+    def _draw_curvature(self, cut: SectionCut) -> None:
+        """Curvature times radius against the clock: 1 on a circle."""
+        if not self._give_room() or cut.curve is None:
             return
         round_line = pg.mkPen(theme.colour("muted"), width=1.5, style=Qt.PenStyle.DashLine)
         self.curvature.addItem(pg.InfiniteLine(1.0, angle=0, pen=round_line))

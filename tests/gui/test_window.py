@@ -13,6 +13,7 @@ from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
 from pipegui.actions import SPECS
 from pipegui.document import Background, ColourBy, ProfileKey, Selection
+from pipegui.panels.deformation_columns import INDEX
 from tests.factories import make_cloud, make_result
 
 LEFT = Qt.MouseButton.LeftButton
@@ -504,7 +505,9 @@ def test_that_all_is_usable_at_1366_by_768(detected):
     assert detected.height() <= 768
     assert detected.parts.scene.width() > 500
     assert detected.parts.scene.height() > 300
-    verdict = detected.panels.table.view.visualRect(detected.panels.table.proxy.index(0, 10))
+    place = detected.panels.table.proxy.index(0, INDEX["verdict"])
+    verdict = detected.panels.table.view.visualRect(place)
+    assert verdict.isValid()
     assert detected.panels.table.view.viewport().rect().contains(verdict)
 
 
