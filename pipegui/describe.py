@@ -81,11 +81,18 @@ def point_count(n_points: int) -> str:
 
 def coordinates(cloud: PointCloud, point_index: int) -> str:
     """World coordinates of a point: "E 432 105.214  N 6 201 877.530  H 112.031"."""
-    world = cloud.world(cloud.xyz[point_index])
-    names = "ENH" if cloud.crs or np.abs(cloud.origin).max() > 1e4 else "XYZ"
-    return "   ".join(
-        f"{n} {format_coordinate(float(v))}" for n, v in zip(names, world, strict=True)
-    )
+    return "   ".join(coordinate_lines(cloud, cloud.xyz[point_index]))
+
+
+def axis_names(cloud: PointCloud) -> str:
+    """What the axes are called: east, north and height, where the cloud is on a map."""
+    return "ENH" if cloud.crs or np.abs(cloud.origin).max() > 1e4 else "XYZ"
+
+
+def coordinate_lines(cloud: PointCloud, local: Array) -> tuple[str, ...]:
+    """World coordinates of a local point, one after the other with their names."""
+    named = zip(axis_names(cloud), cloud.world(local), strict=True)
+    return tuple(f"{name} {format_coordinate(float(value))}" for name, value in named)
 
 
 def hover_text(scan: Scan, point_index: int) -> str:

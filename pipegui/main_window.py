@@ -13,7 +13,7 @@ from pipecore.report.summary import summarise
 from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
 from pipegui.actions import VIEW_OPTIONS, Actions
-from pipegui.document import Background, Document, Scan
+from pipegui.document import Background, Document, Scan, Tool
 from pipegui.history import History
 from pipegui.jobs import Jobs
 from pipegui.layout import LAYOUT_VERSION, Panels, arrange
@@ -172,6 +172,8 @@ class MainWindow(QMainWindow):
             self.actions_.set_checked(name, bool(getattr(state.view, name)))
         if state.view.eye_dome is None:
             self.actions_.set_checked("eye_dome", self.parts.scene.shades_edges)
+        self.actions_.set_checked("measure", state.view.tool is Tool.MEASURE)
+        self.actions_.set_checked("coordinates", state.view.tool is Tool.COORDINATES)
         for background in Background:
             chosen = background is state.view.background
             self.actions_.set_checked(f"background_{background.name.lower()}", chosen)
@@ -185,6 +187,7 @@ class MainWindow(QMainWindow):
     def update_actions(self) -> None:
         """Enable the actions that make sense now."""
         document, busy = self.document, self.jobs.is_busy
+        view = document.view
         self.actions_.update(
             {
                 "scan": document.scan is not None,
@@ -192,6 +195,8 @@ class MainWindow(QMainWindow):
                 "result": document.result is not None,
                 "deformations": bool(document.result and document.result.deformations),
                 "selection": self._state.window.has_selection,
+                "escape": self._state.window.has_selection or view.tool is not Tool.SELECT,
+                "measured": bool(view.measurements),
                 "hidden": bool(document.view.hidden_elements),
                 "busy": busy,
                 "idle": not busy,

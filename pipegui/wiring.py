@@ -3,9 +3,11 @@
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
-from pipegui import commands, view_commands
+from PySide6.QtGui import QGuiApplication
+
+from pipegui import commands, describe, view_commands
 from pipegui.actions import VIEW_OPTIONS
-from pipegui.document import Background
+from pipegui.document import Background, Tool
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -25,7 +27,11 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "quit": window.close,
         "undo": window.history.undo,
         "redo": window.history.redo,
-        "go_up": lambda: do(commands.select_parent),
+        "go_up": lambda: do(view_commands.escape),
+        "measure": lambda _: do(view_commands.choose_tool, Tool.MEASURE),
+        "coordinates": lambda _: do(view_commands.choose_tool, Tool.COORDINATES),
+        "delete_measurement": lambda: do(view_commands.delete_measurement, -1),
+        "delete_measurements": lambda: do(view_commands.delete_measurements),
         "fit": scene.fit,
         "next_scan": lambda: do(commands.step_scan),
         "detect": window.detect,
@@ -86,10 +92,23 @@ def connect_panels(window: "MainWindow") -> None:
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
 
 
+def _click(window: "MainWindow", point_index: int) -> None:
+    """Do what the tool does; coordinates go to the clipboard as plain numbers too."""
+    window.do(view_commands.click_point, point_index)
+    scan, tool = window.document.scan, window.document.view.tool
+    if tool is Tool.COORDINATES and scan is not None and point_index >= 0:
+        world = scan.cloud.world(scan.cloud.xyz[point_index])
+        QGuiApplication.clipboard().setText("\t".join(f"{v:.3f}" for v in world))
+        window.statusBar().showMessage(
+            f"Copied: {describe.coordinates(scan.cloud, point_index)}", 4000
+        )
+
+
 def connect_views(window: "MainWindow") -> None:
     """Connect the 3D view and the plots."""
     do, parts = window.do, window.parts
-    parts.scene.picked.connect(lambda i: do(commands.select_point, i))
+    parts.scene.picked.connect(lambda i: _click(window, i))
+    parts.scene.measurement_closed.connect(lambda i: do(view_commands.delete_measurement, i))
     parts.scene.deformation_picked.connect(lambda i: do(commands.select_deformation, i))
     parts.scene.hovered.connect(window.hover)
     parts.radius_plot.profile_clicked.connect(

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QWidget
 from pipecore.geometry import Array
 from pipegui import theme
 from pipegui.scene.legend import Legend
+from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
 from pipegui.scene.projection import Projection
 from pipegui.theme import SPACING
@@ -74,6 +75,10 @@ class Overlay(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.labels: tuple[Label, ...] = ()
         self.legend: Legend | None = None
+        self.marks: tuple[MeasureMark, ...] = ()
+        self.hint = ""
+        """What to do next, at the top."""
+        self._crosses: list[tuple[QRectF, int]] = []
         self._projection: Projection | None = None
         self._pose: Pose | None = None
         self._targets: list[tuple[QRectF, int]] = []
@@ -89,6 +94,10 @@ class Overlay(QWidget):
         """Id of the deformation whose label or mark is there, or 0."""
         return next((i for box, i in self._targets if box.contains(position)), 0)
 
+    def measurement_at(self, position: QPointF) -> int:
+        """Number of the measurement whose closing cross is there, or -1."""
+        return next((i for box, i in self._crosses if box.contains(position)), -1)
+
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Write everything."""
         if self._projection is None or self._pose is None:
@@ -98,8 +107,24 @@ class Overlay(QWidget):
         taken = [self._draw_corner(painter, self._projection, self._pose)]
         if self.legend is not None:
             taken.append(self._draw_legend(painter, self.legend))
+        if self.hint:
+            taken.append(self._draw_hint(painter, self.hint))
+        accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
+        pens = Pens(accent, text, paper)
+        self._crosses = draw_marks(painter, self.marks, self._projection, pens, taken)
         self._draw_labels(painter, self._projection, taken)
         painter.end()
+
+    def _draw_hint(self, painter: QPainter, text: str) -> QRectF:
+        metrics = painter.fontMetrics()
+        width = metrics.horizontalAdvance(text) + 2 * SPACING
+        box = QRectF(1.5 * SPACING, 1.5 * SPACING, width, metrics.height() + SPACING)
+        painter.setPen(QPen(self._tint("accent"), 1.0))
+        painter.setBrush(self._paper())
+        painter.drawRoundedRect(box, 4, 4)
+        painter.setPen(self._tint("text"))
+        painter.drawText(box, Qt.AlignmentFlag.AlignCenter, text)
+        return box
 
     # Labels
 

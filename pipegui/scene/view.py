@@ -5,7 +5,7 @@ import threading
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QTimer, Signal
+from PySide6.QtCore import QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
@@ -15,13 +15,14 @@ from pipecore.types import NO_ID, Deformation, DeformationKind
 from pipegui import theme
 from pipegui.colour_maps import Colours
 from pipegui.colours import VERDICT
-from pipegui.document import Background, ViewOptions
+from pipegui.document import Background, Measurement, Tool, ViewOptions
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.decorations import Decorations
 from pipegui.scene.legend import make_legend
+from pipegui.scene.measure_marks import MeasureMark, lines_of
 from pipegui.scene.overlay import Label, Overlay
 from pipegui.scene.picking import pick_point, warm_up
 from pipegui.scene.point_layer import PointLayer
@@ -35,6 +36,12 @@ BACKGROUND = {
     Background.BLACK: ("#000000", "#000000"),
 }
 """Bottom and top."""
+HINTS = {
+    Tool.SELECT: ("", ""),
+    Tool.MEASURE: ("Click the first point · Esc ends", "Click the second point · Esc ends"),
+    Tool.COORDINATES: ("Click a point: its coordinates are copied · Esc ends", ""),
+}
+"""Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
 COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
@@ -49,6 +56,9 @@ class SceneView(QWidget):
     """Index of the point under the resting cursor, -1 for none."""
     deformation_picked = Signal(int)
     """Id of the deformation whose label was clicked."""
+
+    measurement_closed = Signal(int)
+    """Number of the measurement whose cross was clicked."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -139,6 +149,27 @@ class SceneView(QWidget):
                 for d in state.result.deformations
                 if d.element_id not in state.view.hidden_elements
             )
+        is_selecting = state.view.tool is Tool.SELECT
+        shape = Qt.CursorShape.ArrowCursor if is_selecting else Qt.CursorShape.CrossCursor
+        self.canvas.setCursor(shape)
+        self.overlay.hint = HINTS[state.view.tool][state.view.measuring_from is not None]
+        self._update_marks()
+
+    def _update_marks(self) -> None:
+        """Show the measurements, and the one being made up to the point under the cursor."""
+        cloud, view = self._state.cloud, self._state.view
+        self.overlay.marks = ()
+        if cloud is None:
+            return
+        shown = list(enumerate(view.measurements))
+        if view.measuring_from is not None:
+            end = None
+            if self._hovered >= 0:
+                east, north, height = cloud.xyz[self._hovered].tolist()
+                end = east, north, height
+            shown.append((-1, Measurement(view.measuring_from, end)))
+        self.overlay.marks = tuple(MeasureMark(i, m, lines_of(m, cloud)) for i, m in shown)
+        self.overlay.update()
 
     def _set_background(self, background: Background) -> None:
         self._background = background
@@ -220,8 +251,12 @@ class SceneView(QWidget):
         # What is clicked is in view: the camera stays unless it sees too little of it.
         self._is_picking = True
         try:
-            deformation_id = self.overlay.deformation_at(position)
-            if deformation_id != NO_ID:
+            closed = self.overlay.measurement_at(position)
+            is_selecting = self._state.view.tool is Tool.SELECT
+            deformation_id = self.overlay.deformation_at(position) if is_selecting else NO_ID
+            if closed >= 0:
+                self.measurement_closed.emit(closed)
+            elif deformation_id != NO_ID:
                 self.deformation_picked.emit(deformation_id)
             else:
                 self.picked.emit(self.pick(position))
@@ -240,6 +275,8 @@ class SceneView(QWidget):
         if index >= 0 or self._hovered >= 0:
             self.hovered.emit(index)
         self._hovered = index
+        if self._state.view.measuring_from is not None:
+            self._update_marks()
 
     def _stop_hovering(self) -> None:
         self._hover_at = None

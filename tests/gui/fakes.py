@@ -32,6 +32,7 @@ class FakeScene(FakeView):
     picked = Signal(int)
     hovered = Signal(int)
     deformation_picked = Signal(int)
+    measurement_closed = Signal(int)
 
     def __init__(self) -> None:
         super().__init__()

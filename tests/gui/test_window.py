@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
 from pipegui.actions import SPECS
-from pipegui.document import Background, ColourBy, ProfileKey, Selection
+from pipegui.document import Background, ColourBy, ProfileKey, Selection, Tool
 from pipegui.panels.deformation_columns import INDEX
 from tests.factories import make_cloud, make_result
 
@@ -253,6 +253,31 @@ def test_that_limits_are_fitted_to_the_deviations(detected):
     deviation = detected.document.result.deviation
     within = np.abs(deviation[np.isfinite(deviation)]) <= limit / 1000
     assert 0.98 <= within.mean() <= 0.995
+
+
+def test_that_measuring_is_reached_by_key_and_left_by_escape(detected, qtbot):
+    scene = detected.parts.scene
+    element = detected.document.selection.element_id
+    key(qtbot, detected, Qt.Key.Key_M)
+    assert scene.state.view.tool is Tool.MEASURE
+    assert detected.actions_["measure"].isChecked()
+    scene.picked.emit(3)
+    scene.picked.emit(400)
+    assert len(scene.state.view.measurements) == 1
+    key(qtbot, detected, Qt.Key.Key_Backspace)
+    assert scene.state.view.measurements == ()
+    key(qtbot, detected, Qt.Key.Key_Escape)
+    assert scene.state.view.tool is Tool.SELECT
+    assert detected.document.selection.element_id == element
+
+
+def test_that_picked_coordinates_are_copied_as_plain_numbers(detected, qtbot):
+    key(qtbot, detected, Qt.Key.Key_C)
+    detected.parts.scene.picked.emit(7)
+    cloud = detected.document.scan.cloud
+    copied = [float(v) for v in QApplication.clipboard().text().split("\t")]
+    assert copied == pytest.approx(cloud.world(cloud.xyz[7]).tolist(), abs=0.0006)
+    assert "Copied" in detected.status.currentMessage()
 
 
 # Undo
