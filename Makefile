@@ -41,6 +41,8 @@ test-gui: venv
 	$(WINDOWED) $(PYTHON) -m pytest tests/gui
 
 study: venv ## Measure the accuracy on simulated scans (half an hour; writes docs/accuracy.md)
+	@# A peer to compare with, of no use to anything else here.
+	$(PYTHON) -m pip install --quiet cylinder-fitting==1.1.4
 	$(PYTHON) -m tests.study
 
 bench: venv ## Measure time and memory (writes docs/performance.md)
