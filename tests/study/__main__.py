@@ -1,4 +1,4 @@
-"""How accurate the detection is: `python -m tests.study [fits pipes plants one-station]`.
+"""How accurate the detection is: `python -m tests.study [fits pipes plants one-station pump]`.
 
 Measures on simulated scans with known truth and writes `docs/accuracy.md`, each section
 apart. What has been measured is kept in out/study for the same sources, so that a run that
@@ -9,10 +9,10 @@ import argparse
 import shlex
 import sys
 
-from tests.study import fits, pipes, plants
+from tests.study import fits, pipes, plants, pump
 from tests.study.store import put_section, sources_digest
 
-SECTIONS = ("fits", "pipes", "plants", "one-station")
+SECTIONS = ("fits", "pipes", "plants", "one-station", "pump")
 
 
 def main() -> None:
@@ -39,6 +39,8 @@ def main() -> None:
             text = pipes.write(args.quick)
         elif section == "plants":
             text = plants.write(4, args.first_seed, n_plants)
+        elif section == "pump":
+            text = pump.write()
         else:
             text = plants.write(1, args.first_seed, n_one)
         source = f"Measured by `{command}`; sources of the core {sources_digest()}."

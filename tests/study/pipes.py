@@ -81,8 +81,8 @@ def write(quick: bool) -> str:
             _line(sweep, v, case, row)
             for v, case, row in zip(sweep.values, cases, rows, strict=True)
         ]
-        head = [sweep.label, "found", "radius: RMS error, mm", "mean error", "plain fit", "cylinder-fitting",
-                "worst", "reported SD", "bound", "axis error, mm"]  # fmt: skip
+        head = [sweep.label, "found", "radius: RMS error, mm", "mean error", "plain fit",
+                "cylinder-fitting", "worst", "reported SD", "bound", "axis error, mm"]  # fmt: skip
         tables.append(table(head, lines))
     handles, labels = axes[0].get_legend_handles_labels()
     axes[-1].axis("off")
@@ -100,8 +100,8 @@ error of an orthogonal least-squares cylinder through just the pipe's own points
 truth: what of a mean error it shares is not the detection's, but comes from orthogonal distances
 meeting noise that lies along the beam. It grows with σ²/r, and
 is larger than the spread where points are many and seen from one side.
-“cylinder-fitting” is the RMS error of that package, given {N_PEER_POINTS} of the pipe's own points, no
-others, and the true direction to start from.
+“cylinder-fitting” is the RMS error of that package, given {N_PEER_POINTS} of the pipe's own
+points, no others, and the true direction to start from.
 
 {image}
 
