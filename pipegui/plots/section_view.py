@@ -3,7 +3,7 @@
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QKeyEvent, QResizeEvent
+from PySide6.QtGui import QAction, QColor, QKeyEvent
 from PySide6.QtWidgets import QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
@@ -61,6 +61,7 @@ class SectionView(Chart):
         self.dimensions.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.canvas.parentWidget().layout().insertWidget(2, self.dimensions)
         self.on_hover(self._hover)
+        self.canvas.sigDeviceRangeChanged.connect(self._refit)
         self.setAccessibleName("Section")
 
     def _make_header(self) -> None:
@@ -207,9 +208,8 @@ class SectionView(Chart):
         self.curvature.setMaximumHeight(16_777_215 if is_shown else 0)
         return is_shown
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+    def _refit(self) -> None:
         """Leave the curvature out of a small panel."""
-        super().resizeEvent(event)
         if self._state.cut is not None and self.curvature.isVisible() != self._give_room():
             self._redraw()
 

@@ -36,16 +36,23 @@ class ThinnedCloud:
     voxel: float
 
 
-def median_spacing(xyz: NDArray[np.floating], n_sample: int = 4000, n_neighbours: int = 8) -> float:
+def median_spacing(
+    xyz: NDArray[np.floating],
+    n_sample: int = 4000,
+    n_neighbours: int = 8,
+    among: NDArray[np.bool_] | None = None,
+) -> float:
     """Typical distance between neighbouring points on the scanned surfaces, metres.
 
     From the radius of the disc that holds `n_neighbours` points around sampled points:
-    close pairs of overlapping scans do not make it smaller than it is.
+    close pairs of overlapping scans do not make it smaller than it is. `among` says around
+    which points, where others lack neighbours.
     """
     if len(xyz) < 2:
         return 0.0
     tree = cKDTree(xyz)
-    sample = xyz[_sample_by_place(xyz, min(n_sample, len(xyz)))]
+    places = xyz if among is None or not among.any() else xyz[among]
+    sample = places[_sample_by_place(places, min(n_sample, len(places)))]
     n_neighbours = min(n_neighbours, len(xyz) - 1)
     reach, _ = tree.query(sample, n_neighbours + 1)
     return float(np.median(reach[:, -1]) * np.sqrt(np.pi / (n_neighbours + 1)))
