@@ -80,6 +80,23 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _option("fly", "Fly to the selection", "Move the camera to what is selected"),
         _SEPARATOR,
         _A(
+            "clip",
+            "Clip box",
+            "Show only what is in a box; drag its faces",
+            "crop-free",
+            "B",
+            "scan",
+            is_checkable=True,
+        ),
+        _A(
+            "clip_to_selection",
+            "Clip to the selection",
+            "Show only what is around the selection",
+            "crop",
+            "Shift+B",
+            "selection",
+        ),
+        _A(
             "measure",
             "Measure distance",
             "Measure between two points",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QDockWidget, QMenu, QTabWidget, QVBoxLayout, QWidget
 
+from pipegui.panels.clip_bar import ClipBar
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.panels.message_bar import MessageBar
 from pipegui.panels.project_tree import ProjectTree
@@ -34,6 +35,7 @@ class Panels:
     table: DeformationTable
     message: MessageBar
     welcome: Welcome
+    clip: ClipBar
     docks: dict[str, QDockWidget]
 
     @classmethod
@@ -47,6 +49,7 @@ class Panels:
             DeformationTable(),
             MessageBar(),
             Welcome(),
+            ClipBar(),
             {},
         )
 
@@ -77,6 +80,7 @@ def arrange(window: "MainWindow") -> None:
     column.setSpacing(0)
     column.addWidget(panels.message)
     column.addWidget(window.centre, 1)
+    column.addWidget(panels.clip)
     window.setCentralWidget(centre)
 
     plots = QTabWidget()

@@ -155,6 +155,7 @@ class MainWindow(QMainWindow):
             "stacks": panels.stacks.apply,
             "settings": panels.settings.apply,
             "table": panels.table.apply,
+            "clip": panels.clip.apply,
             "properties": self._apply_properties,
             "radius_plot": parts.radius_plot.apply,
             "section": parts.section.apply,
@@ -172,6 +173,7 @@ class MainWindow(QMainWindow):
             self.actions_.set_checked(name, bool(getattr(state.view, name)))
         if state.view.eye_dome is None:
             self.actions_.set_checked("eye_dome", self.parts.scene.shades_edges)
+        self.actions_.set_checked("clip", state.view.clip_box is not None)
         self.actions_.set_checked("measure", state.view.tool is Tool.MEASURE)
         self.actions_.set_checked("coordinates", state.view.tool is Tool.COORDINATES)
         for background in Background:

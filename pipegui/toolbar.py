@@ -33,7 +33,7 @@ class ToolBar(QToolBar):
         for name in ("undo", "redo"):
             self.addAction(actions[name])
         self.addSeparator()
-        for name in ("measure", "coordinates"):
+        for name in ("clip", "measure", "coordinates"):
             self.addAction(actions[name])
         self.addSeparator()
         for name in ("fit", "view_top", "view_front", "view_right", "view_iso"):

@@ -1,9 +1,13 @@
 """What the user can do to the 3D view, beside the commands on scans and results. Qt-free."""
 
+from functools import lru_cache
+
 import numpy as np
 
+from pipecore.geometry import Array, surface_points
+from pipecore.types import Element, PointCloud
 from pipegui.commands import select_parent, select_point, set_view
-from pipegui.document import Document, Measurement, Point, Tool
+from pipegui.document import Box, Document, Measurement, Point, Tool
 
 POINT_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)
 N_SAMPLED = 200_000
@@ -87,3 +91,77 @@ def _point(document: Document, point_index: int) -> Point:
 def _keep(document: Document, measurement: Measurement) -> Document:
     measurements = (*document.view.measurements, measurement)
     return set_view(document, measurements=measurements, measuring_from=None)
+
+
+# Clipping
+
+MARGIN = 0.1
+"""Around what is clipped to, metres."""
+SMALLEST_BOX = 0.01
+
+
+def switch_clip(document: Document) -> Document:
+    """Clip to the whole scan, whose faces can then be dragged; or stop clipping."""
+    if document.view.clip_box is not None:
+        return set_view(document, clip_box=None)
+    return clip_to_scan(document)
+
+
+def clip_to_scan(document: Document) -> Document:
+    """Let the clip box hold the whole scan."""
+    if document.scan is None:
+        return document
+    low, high = extent(document.scan.cloud)
+    return set_clip_box(document, Box(_triple(low), _triple(high)))
+
+
+def clip_to_selection(document: Document) -> Document:
+    """Let the clip box hold what is selected, with a margin."""
+    result, selection = document.result, document.selection
+    if result is None:
+        return document
+    if selection.deformation_id:
+        deformation = result.deformation(selection.deformation_id)
+        element = result.element(deformation.element_id)
+        points = _outline(element, deformation.chainage_start, deformation.chainage_end)
+    else:
+        chosen = [
+            e
+            for e in result.elements
+            if (e.element_id == selection.element_id)
+            or (not selection.element_id and selection.run_id and e.run_id == selection.run_id)
+        ]
+        if not chosen:
+            return document
+        points = np.concatenate([_outline(e, 0.0, e.axis.length) for e in chosen])
+    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    return set_clip_box(document, Box(_triple(low), _triple(high)))
+
+
+def set_clip_box(document: Document, box: Box) -> Document:
+    """Clip to a box; it keeps a centimetre along each axis."""
+    low, high = np.array(box.low), np.array(box.high)
+    low, high = np.minimum(low, high), np.maximum(low, high)
+    high = np.maximum(high, low + SMALLEST_BOX)
+    return set_view(document, clip_box=Box(_triple(low), _triple(high)))
+
+
+@lru_cache(maxsize=2)
+def extent(cloud: PointCloud) -> tuple[Array, Array]:
+    """Least and greatest local coordinates of a cloud."""
+    columns = cloud.xyz.T
+    low = np.array([c.min() for c in columns], np.float64)
+    return low, np.array([c.max() for c in columns], np.float64)
+
+
+def _outline(element: Element, start: float, end: float) -> Array:
+    """Points around a stretch of an element, shape (n, 3)."""
+    clock = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    s, clock = np.meshgrid(np.linspace(start, end, 16), clock)
+    s = s.ravel()
+    return surface_points(element.axis, s, element.radius_at(s), clock.ravel())
+
+
+def _triple(values: Array) -> Point:
+    x, y, z = values.tolist()
+    return x, y, z

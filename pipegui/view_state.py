@@ -27,7 +27,7 @@ from pipecore.types import (
     Stack,
 )
 from pipegui import cuts, selecting
-from pipegui.document import Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.document import Box, Document, ProfileKey, Scan, Selection, ViewOptions
 from pipegui.section_cut import SectionCut, cut_section
 
 Array = NDArray[np.float64]
@@ -207,6 +207,15 @@ class PropertiesState:
 
 
 @dataclass(frozen=True)
+class ClipState:
+    """The clip box in numbers."""
+
+    box: Box | None = None
+    cloud: PointCloud | None = None
+    has_selection: bool = False
+
+
+@dataclass(frozen=True)
 class WindowState:
     """Title, status bar and which actions make sense."""
 
@@ -225,6 +234,7 @@ class ViewState:
     stacks: StacksState = StacksState()
     settings: Settings = Settings()
     table: TableState = TableState()
+    clip: ClipState = ClipState()
     properties: PropertiesState = PropertiesState()
     radius_plot: RadiusPlotState = RadiusPlotState()
     section: SectionState = SectionState()
@@ -263,6 +273,7 @@ def resolve(document: Document) -> ViewState:
         ),
         settings=document.settings,
         table=TableState(result, selection.deformation_id, scan.reviews if scan else {}),
+        clip=ClipState(view.clip_box, scan.cloud if scan else None, selection != Selection()),
         properties=PropertiesState(scan, selection, profile),
         **_element_states(scan, selection, view, shown),
     )

@@ -28,6 +28,8 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "undo": window.history.undo,
         "redo": window.history.redo,
         "go_up": lambda: do(view_commands.escape),
+        "clip": lambda _: do(view_commands.switch_clip),
+        "clip_to_selection": lambda: do(view_commands.clip_to_selection),
         "measure": lambda _: do(view_commands.choose_tool, Tool.MEASURE),
         "coordinates": lambda _: do(view_commands.choose_tool, Tool.COORDINATES),
         "delete_measurement": lambda: do(view_commands.delete_measurement, -1),
@@ -87,6 +89,10 @@ def connect_panels(window: "MainWindow") -> None:
     panels.stacks.removed.connect(lambda i: do(commands.remove_stack, i))
     panels.stacks.shown.connect(lambda i: do(commands.show_stack, i))
     panels.stacks.editor.view_direction = window.parts.scene.view_direction
+    panels.clip.changed.connect(lambda box: do(view_commands.set_clip_box, box))
+    panels.clip.whole_requested.connect(lambda: do(view_commands.clip_to_scan))
+    panels.clip.selection_requested.connect(lambda: do(view_commands.clip_to_selection))
+    panels.clip.closed.connect(lambda: do(commands.set_view, clip_box=None))
     bar = window.tool_bar
     bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
@@ -108,6 +114,7 @@ def connect_views(window: "MainWindow") -> None:
     """Connect the 3D view and the plots."""
     do, parts = window.do, window.parts
     parts.scene.picked.connect(lambda i: _click(window, i))
+    parts.scene.clip_dragged.connect(lambda box: do(view_commands.set_clip_box, box))
     parts.scene.measurement_closed.connect(lambda i: do(view_commands.delete_measurement, i))
     parts.scene.deformation_picked.connect(lambda i: do(commands.select_deformation, i))
     parts.scene.hovered.connect(window.hover)

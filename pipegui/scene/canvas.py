@@ -33,6 +33,8 @@ SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "microsoft basic re
 """Names by which OpenGL without a graphics card is known, in small letters."""
 
 LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
+Drag = Callable[[QPointF, bool], None]
+"""Told where the mouse is, and whether the button was let go there."""
 SHIFT = Qt.KeyboardModifier.ShiftModifier
 
 
@@ -56,6 +58,9 @@ class Canvas(QVTKRenderWindowInteractor):
         # keep both alive; `SceneView.close` closes the canvas instead.
         parent.destroyed.disconnect(self.close)
         self.point_under: Callable[[QPointF], Array | None] = lambda _: None
+        self.grab: Callable[[QPointF], Drag | None] = lambda _: None
+        """Asked at a press of the left button: what the drag then moves, None for the camera."""
+        self._held: Drag | None = None
         self.pose = Pose(np.zeros(3), 1.0)
         self.is_moving = False
         self.is_parallel = False
@@ -238,6 +243,10 @@ class Canvas(QVTKRenderWindowInteractor):
         self._flight.stop()
         self._press = self._last = event.position()
         self._is_drag = False
+        if event.button() == LEFT:
+            self._held = self.grab(event.position())
+        if self._held is not None:
+            return
         under = self.point_under(event.position())
         self._pivot = self.pose.focus if under is None else under
 
@@ -251,6 +260,10 @@ class Canvas(QVTKRenderWindowInteractor):
         if not self._is_drag and way < QApplication.startDragDistance():
             return
         self._is_drag = True
+        if self._held is not None:
+            self._held(position, False)
+            self.move_to(self.pose)
+            return
         step, self._last = position - self._last, position
         if event.buttons() & MIDDLE or event.modifiers() & SHIFT:
             depth = float((self._pivot - self.pose.position) @ self.pose.forward)
@@ -262,7 +275,10 @@ class Canvas(QVTKRenderWindowInteractor):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: N802
         """Click, unless the mouse was dragged."""
-        was_click = self._press is not None and not self._is_drag
+        held, self._held = self._held, None
+        was_click = self._press is not None and not self._is_drag and held is None
+        if held is not None:
+            held(event.position(), True)
         self._press = self._last = None
         self._is_drag = False
         if was_click and event.button() == LEFT:
@@ -303,7 +319,7 @@ class Canvas(QVTKRenderWindowInteractor):
         self._flight.stop()
         self._resting.stop()
         self._settling.stop()
-        self.point_under = lambda _: None
+        self.point_under, self.grab, self._held = lambda _: None, lambda _: None, None
         window = self.GetRenderWindow()
         if self._shading is not None:
             self.layers[0].SetPass(None)

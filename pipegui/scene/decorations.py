@@ -9,10 +9,10 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from pipecore.types import OWN_STACK, Element
 from pipegui import theme
-from pipegui.document import ColourBy
+from pipegui.document import Box, ColourBy
 from pipegui.scene import shapes
 from pipegui.scene.colouring import effective, visible_elements
-from pipegui.scene.point_layer import point_actor
+from pipegui.scene.point_layer import point_actor, set_planes
 from pipegui.view_state import SceneState
 
 MAX_HIGHLIGHTED = {False: 400_000, True: 20_000}
@@ -32,6 +32,7 @@ class Decorations:
         self._layers = layers
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
         self._accented: dict[bool, vtkActor] = {}
+        self._box: Box | None = None
         self.dark = False
         """Whether it is drawn on a dark background."""
 
@@ -58,6 +59,15 @@ class Decorations:
             actor.SetVisibility(is_for_moving == moving)
             actor.GetProperty().SetPointSize(point_px + 1)
 
+    def clip(self, box: Box | None) -> None:
+        """Draw only what lies in the box."""
+        if box == self._box:
+            return
+        self._box = box
+        for group in self._groups.values():
+            for _, actor in group:
+                set_planes(actor, box)
+
     def clear(self) -> None:
         """Take all away."""
         self._accented = {}
@@ -73,6 +83,7 @@ class Decorations:
         self._groups[name] = [(self._layers[i], actor) for i, actor in actors]
         for layer, actor in self._groups[name]:
             layer.AddActor(actor)
+            set_planes(actor, self._box)
 
     def _axes(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         elements = visible_elements(state.result, state.view.hidden_elements)

@@ -17,6 +17,7 @@ from pipegui.theme import SPACING
 
 ICON = 16
 LEADER = 36
+HANDLE = 5.0
 SCALE_BAR_PX = 140
 TRIAD_PX = 30
 TRIAD_REACH = TRIAD_PX + 18
@@ -76,6 +77,8 @@ class Overlay(QWidget):
         self.labels: tuple[Label, ...] = ()
         self.legend: Legend | None = None
         self.marks: tuple[MeasureMark, ...] = ()
+        self.handles: Array | None = None
+        """Of the clip box, local coordinates, shape (n, 3)."""
         self.hint = ""
         """What to do next, at the top."""
         self._crosses: list[tuple[QRectF, int]] = []
@@ -107,6 +110,8 @@ class Overlay(QWidget):
         taken = [self._draw_corner(painter, self._projection, self._pose)]
         if self.legend is not None:
             taken.append(self._draw_legend(painter, self.legend))
+        if self.handles is not None:
+            self._draw_handles(painter, self._projection, self.handles)
         if self.hint:
             taken.append(self._draw_hint(painter, self.hint))
         accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
@@ -114,6 +119,13 @@ class Overlay(QWidget):
         self._crosses = draw_marks(painter, self.marks, self._projection, pens, taken)
         self._draw_labels(painter, self._projection, taken)
         painter.end()
+
+    def _draw_handles(self, painter: QPainter, projection: Projection, handles: Array) -> None:
+        pixels, _ = projection.to_screen(handles)
+        painter.setPen(QPen(self._tint("accent"), 2.0))
+        painter.setBrush(self._tint("base"))
+        for x, y in pixels[np.isfinite(pixels).all(axis=1)]:
+            painter.drawEllipse(QPointF(x, y), HANDLE, HANDLE)
 
     def _draw_hint(self, painter: QPainter, text: str) -> QRectF:
         metrics = painter.fontMetrics()

@@ -14,9 +14,9 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkRenderer
 
-from pipecore.geometry import Array
 from pipecore.types import Floats, PointCloud
 from pipegui.colour_maps import Colours
+from pipegui.document import Box
 from pipegui.scene.spreading import Spread
 
 SMALLEST_SLICE, LARGEST_SLICE = 25_000, 4_000_000
@@ -76,7 +76,7 @@ class PointLayer:
         self._colour: ColourRows | None = None
         self._slices: list[_Slice] = []
         self._seconds_per_point = 1e-7
-        self._clip: tuple[Array, Array] | None = None
+        self._clip: Box | None = None
         self._is_drawing_new = False
         self.n_shown = 0
         """Number of points in the slices that are shown."""
@@ -154,11 +154,11 @@ class PointLayer:
             weight = 0.5 * min(self.n_shown / MOVING_LEVEL, 1)
             self._seconds_per_point += weight * (measured - self._seconds_per_point)
 
-    def clip(self, low: Array, high: Array) -> None:
-        """Draw only what lies between two corners; see `set_points` for leaving points out."""
-        self._clip = low, high
+    def clip(self, box: Box) -> None:
+        """Draw only what lies in the box; see `set_points` for leaving points out."""
+        self._clip = box
         for part in self._slices:
-            _set_planes(part.actor, low, high)
+            set_planes(part.actor, self._clip)
 
     def clear_actors(self) -> None:
         """Take all points out of the renderer."""
@@ -189,15 +189,18 @@ class PointLayer:
         actor = point_actor(xyz, colours)
         actor.VisibilityOff()
         if self._clip is not None:
-            _set_planes(actor, *self._clip)
+            set_planes(actor, self._clip)
         self._renderer.AddActor(actor)
         return _Slice(stop, rows, xyz, colours, actor)
 
 
-def _set_planes(actor: vtkActor, low: Array, high: Array) -> None:
+def set_planes(actor: vtkActor, box: Box | None) -> None:
+    """Let an actor draw only what lies in the box."""
     mapper = actor.GetMapper()
     mapper.RemoveAllClippingPlanes()
-    for corner, sign in ((low, 1.0), (high, -1.0)):
+    if box is None:
+        return
+    for corner, sign in ((box.low, 1.0), (box.high, -1.0)):
         for axis in range(3):
             plane = vtkPlane()
             plane.SetOrigin(corner)

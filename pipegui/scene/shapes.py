@@ -40,6 +40,15 @@ def end_rings(element: Element) -> pv.PolyData:
     return _polylines([surface_points(element.axis, s, element.radius_at(s), clock) for s in ends])
 
 
+def box_lines(low: Array, high: Array) -> pv.PolyData:
+    """Return the edges of an upright box: two rings and the posts between them."""
+    x, y = np.array([low[0], high[0]]), np.array([low[1], high[1]])
+    ring = np.column_stack([x[[0, 1, 1, 0, 0]], y[[0, 0, 1, 1, 0]]])
+    rings = [np.column_stack([ring, np.full(5, z)]) for z in (low[2], high[2])]
+    posts = [np.stack([rings[0][i], rings[1][i]]) for i in range(4)]
+    return _polylines([*rings, *posts])
+
+
 def surfaces(elements: tuple[Element, ...]) -> pv.PolyData:
     """Return the fitted surfaces of `elements` with their normals."""
     meshes = [_surface(e) for e in elements]

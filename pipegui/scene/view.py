@@ -2,6 +2,7 @@
 
 import math
 import threading
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,12 @@ from pipecore.types import NO_ID, Deformation, DeformationKind
 from pipegui import theme
 from pipegui.colour_maps import Colours
 from pipegui.colours import VERDICT
-from pipegui.document import Background, Measurement, Tool, ViewOptions
+from pipegui.document import Background, Box, Measurement, Tool, ViewOptions
+from pipegui.scene import clipping
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
+from pipegui.scene.clipping import BoxFrame
 from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.decorations import Decorations
 from pipegui.scene.legend import make_legend
@@ -60,6 +63,9 @@ class SceneView(QWidget):
     measurement_closed = Signal(int)
     """Number of the measurement whose cross was clicked."""
 
+    clip_dragged = Signal(object)
+    """The clip `Box` after a handle was dragged."""
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._state = SceneState()
@@ -70,6 +76,9 @@ class SceneView(QWidget):
         self.overlay = Overlay(self.canvas)
         self.points = PointLayer(self.canvas.layers[0])
         self._decorations = Decorations(self.canvas.layers)
+        self._frame = BoxFrame(self.canvas.layers[1])
+        self._preview = PointLayer(self.canvas.layers[0])
+        """All points, in the box or not, while the box is dragged."""
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.canvas)
@@ -77,6 +86,7 @@ class SceneView(QWidget):
         self._hover_timer = QTimer(self, singleShot=True, interval=HOVER_MS)
         self._hover_timer.timeout.connect(self._hover)
         self.canvas.point_under = self._point_under
+        self.canvas.grab = self._grab
         self.canvas.clicked.connect(self._click)
         self.canvas.hovered.connect(self._wait_for_hover)
         self.canvas.left.connect(self._stop_hovering)
@@ -101,6 +111,7 @@ class SceneView(QWidget):
         self._update_points(state, before, is_new_cloud=is_new_cloud, is_new_theme=is_new_theme)
         self._decorations.dark = self.overlay.dark = background in IS_DARK
         self._decorations.update(state, before, everything=is_new_theme or is_new_cloud)
+        self._show_box(state.view.clip_box)
         self._update_overlay(state)
         if is_new_cloud and state.scan_key != before.scan_key:
             self.canvas.fly_to(self._fitted(self.canvas.pose), fly=False)
@@ -148,6 +159,7 @@ class SceneView(QWidget):
                 _label(d, is_selected=d.deformation_id == state.selection.deformation_id)
                 for d in state.result.deformations
                 if d.element_id not in state.view.hidden_elements
+                and clipping.is_inside(state.view.clip_box, d.peak)
             )
         is_selecting = state.view.tool is Tool.SELECT
         shape = Qt.CursorShape.ArrowCursor if is_selecting else Qt.CursorShape.CrossCursor
@@ -223,11 +235,46 @@ class SceneView(QWidget):
         self.points.show(
             seconds=canvas.seconds_to_draw,
             pixel_size=projection.pixel_size(canvas.pose.distance),
-            visible=self._state.view.show_points,
+            visible=self._state.view.show_points and not len(self._preview),
             size=self._state.view.point_size,
         )
+        if len(self._preview):
+            self._preview.show(seconds=0.0, pixel_size=projection.pixel_size(canvas.pose.distance))
         self._decorations.prepare(moving=canvas.is_moving, point_px=self.points.point_px)
         self.overlay.follow(projection, canvas.pose)
+
+    # Clipping
+
+    def _show_box(self, box: Box | None) -> None:
+        tint = theme.colour("accent", dark=self._background in IS_DARK)
+        self._frame.show(box, (tint.redF(), tint.greenF(), tint.blueF()))
+        self._decorations.clip(box)
+        self.overlay.handles = None if box is None else clipping.handles(box)
+
+    def _grab(self, position: QPointF) -> Callable[[QPointF, bool], None] | None:
+        """Take hold of the box's handle under the cursor."""
+        state = self._state
+        box, start = state.view.clip_box, (position.x(), position.y())
+        if box is None or state.cloud is None:
+            return None
+        projection = self.canvas.projection()
+        handle = clipping.handle_at(box, projection, start)
+        if handle < 0:
+            return None
+        visible = visible_points(state.cloud, state.result, state.view.hidden_elements)
+        self._preview.set_points(state.cloud, visible, self._colour)
+        self._preview.clip(box)
+
+        def drag(now: QPointF, is_over: bool) -> None:
+            dragged = clipping.drag(box, handle, projection, start, (now.x(), now.y()))
+            if is_over:
+                self._preview.clear_actors()
+                self.clip_dragged.emit(dragged)
+            else:
+                self._preview.clip(dragged)
+                self._show_box(dragged)
+
+        return drag
 
     # Mouse
 
@@ -301,6 +348,8 @@ class SceneView(QWidget):
         self._warming.join()
         self._hover_timer.stop()
         self._decorations.clear()
+        self._frame.show(None, (0.0, 0.0, 0.0))
+        self._preview.clear_actors()
         self.points.clear_actors()
         self._state = SceneState()
         self.canvas.close()

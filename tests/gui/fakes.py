@@ -33,6 +33,7 @@ class FakeScene(FakeView):
     hovered = Signal(int)
     deformation_picked = Signal(int)
     measurement_closed = Signal(int)
+    clip_dragged = Signal(object)
 
     def __init__(self) -> None:
         super().__init__()

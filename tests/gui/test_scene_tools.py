@@ -6,14 +6,16 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from pipegui import view_commands
-from pipegui.document import Document, Measurement, Scan, Tool, ViewOptions
+from pipegui.document import Box, Document, Measurement, Scan, Tool, ViewOptions
+from pipegui.scene import clipping
 from pipegui.scene.measure_marks import lines_of
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import ORIGIN, make_scan
-from tests.gui.test_scene_view import drag, on_screen, seen_points, settle
+from tests.gui.test_scene_view import drag, mouse_move, on_screen, picture, seen_points, settle
 
 CLOUD, RESULT = make_scan()
+NO_KEYS = Qt.KeyboardModifier.NoModifier
 LEFT = Qt.MouseButton.LeftButton
 STILL = ViewOptions(fly=False, show_labels=False)
 
@@ -26,6 +28,7 @@ class Desk:
         self.scene = SceneView()
         self.document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),), view=STILL)
         self.scene.picked.connect(lambda i: self.do(view_commands.click_point, i))
+        self.scene.clip_dragged.connect(lambda box: self.do(view_commands.set_clip_box, box))
         self.scene.measurement_closed.connect(
             lambda i: self.do(view_commands.delete_measurement, i)
         )
@@ -136,3 +139,94 @@ def test_that_a_drag_still_orbits_while_measuring(desk, qtbot):
     drag(qtbot, desk.scene, LEFT, QPoint(320, 240), QPoint(420, 240))
     assert before @ desk.scene.view_direction() < 0.99
     assert desk.view.measuring_from is None
+
+
+# Clipping
+
+BOX = Box((0.4, 0.2, 0.2), (2.4, 1.8, 1.2))
+
+
+def pixel_of(desk, handle):
+    pixels, _ = desk.scene.canvas.projection().to_screen(clipping.handles(desk.view.clip_box))
+    return QPoint(*np.rint(pixels[handle]).astype(int).tolist())
+
+
+def clip(desk, box=BOX):
+    desk.do(view_commands.set_clip_box, box)
+    settle(desk.qtbot, desk.scene)
+
+
+@pytest.mark.parametrize("face", range(6))
+def test_that_a_dragged_face_follows_the_mouse_and_no_other_moves(desk, face):
+    clip(desk)
+    axis, side = divmod(face, 2)
+    start = pixel_of(desk, face)
+    ends = np.array([BOX.low, BOX.high])
+    wanted = clipping.handles(BOX)[face]
+    wanted[axis] += (0.2, -0.2)[side]
+    pixels, _ = desk.scene.canvas.projection().to_screen(wanted)
+    before = desk.scene.canvas.pose
+    drag(desk.qtbot, desk.scene, LEFT, start, QPoint(*np.rint(pixels[0]).astype(int).tolist()))
+    box = desk.view.clip_box
+    ends[side, axis] += (0.2, -0.2)[side]
+    assert np.array([box.low, box.high]) == pytest.approx(ends, abs=0.02)
+    assert desk.scene.canvas.pose.position == pytest.approx(before.position)
+    settle(desk.qtbot, desk.scene)
+    inside = np.all((CLOUD.xyz >= box.low) & (CLOUD.xyz <= box.high), axis=1)
+    assert len(desk.scene.points) == inside.sum()
+
+
+def test_that_the_middle_handle_moves_the_box_in_the_picture(desk, qtbot):
+    clip(desk)
+    start = pixel_of(desk, clipping.MIDDLE)
+    drag(qtbot, desk.scene, LEFT, start, start + QPoint(40, -30))
+    box = desk.view.clip_box
+    size = np.subtract(box.high, box.low)
+    assert size == pytest.approx(np.subtract(BOX.high, BOX.low))
+    assert (pixel_of(desk, clipping.MIDDLE) - start - QPoint(40, -30)).manhattanLength() <= 3
+
+
+def test_that_while_a_face_is_dragged_points_beyond_the_old_box_come_back(desk, qtbot):
+    clip(desk, Box((0.4, 0.2, 0.2), (0.9, 0.8, 0.8)))
+    start = pixel_of(desk, 1)
+    qtbot.mousePress(desk.scene.canvas, LEFT, pos=start)
+    for i in range(1, 6):
+        event = mouse_move((start + QPoint(12 * i, 0)).toPointF(), LEFT, NO_KEYS)
+        QApplication.sendEvent(desk.scene.canvas, event)
+    QApplication.processEvents()
+    few = picture(desk.scene)
+    qtbot.mouseRelease(desk.scene.canvas, LEFT, pos=start + QPoint(60, 0))
+    settle(qtbot, desk.scene)
+    assert desk.view.clip_box.high[0] > 1.0
+    # What was seen during the drag is what is seen after it.
+    assert np.abs(picture(desk.scene) - few).max(axis=2).mean() < 6
+
+
+def test_that_overlays_are_clipped_with_the_points(desk):
+    desk.do(lambda d: view_commands.set_view(d, show_labels=True))
+    assert len(desk.scene.overlay.labels) == 4
+    peak = RESULT.deformation(1).peak
+    clip(desk, Box(tuple((peak - 0.2).tolist()), tuple((peak + 0.2).tolist())))
+    assert [label.deformation_id for label in desk.scene.overlay.labels] == [1]
+    outside = picture(desk.scene)[:60, 300:]
+    assert np.ptp(outside[..., 0]) < 40
+
+
+def test_that_the_box_can_hold_the_selection_or_the_scan():
+    document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),), view=STILL)
+    whole = view_commands.switch_clip(document).view.clip_box
+    assert np.array(whole.low) == pytest.approx(CLOUD.xyz.min(axis=0))
+    document = view_commands.select_point(document, int(np.flatnonzero(RESULT.element_id == 7)[0]))
+    box = view_commands.clip_to_selection(document).view.clip_box
+    points = CLOUD.xyz[RESULT.element_id == 7]
+    assert (points >= box.low).all()
+    assert (points <= box.high).all()
+    assert np.subtract(box.high, box.low).max() < np.ptp(points, axis=0).max() + 0.3
+    assert view_commands.switch_clip(view_commands.switch_clip(document)).view.clip_box is None
+
+
+def test_that_a_box_never_vanishes():
+    document = Document(scans=(Scan("plant.laz", CLOUD),))
+    box = view_commands.set_clip_box(document, Box((1.0, 5.0, 0.0), (1.0, 2.0, 3.0))).view.clip_box
+    assert box.low == (1.0, 2.0, 0.0)
+    assert box.high == pytest.approx((1.01, 5.0, 3.0))

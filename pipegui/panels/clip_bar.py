@@ -1,0 +1,81 @@
+"""The clip box in numbers: a bar below the 3D view while there is one."""
+
+import numpy as np
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+
+from pipegui import describe, theme
+from pipegui.document import Box
+from pipegui.panels.widgets import Applying, QuietSpinBox
+from pipegui.view_state import ClipState
+
+STEP = 0.05
+
+
+class ClipBar(QWidget):
+    """World coordinates of the box's faces, and where else the box can go."""
+
+    changed = Signal(object)
+    """The `Box` that was typed."""
+    whole_requested = Signal()
+    selection_requested = Signal()
+    closed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._applying = Applying()
+        self._origin = np.zeros(3)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(theme.SPACING, 2, theme.SPACING, 2)
+        row.setSpacing(theme.SPACING // 2)
+        self._names = [QLabel() for _ in range(3)]
+        self.ends: list[list[QuietSpinBox]] = []
+        for name in self._names:
+            row.addWidget(name)
+            self.ends.append([QuietSpinBox() for _ in range(2)])
+            for field in self.ends[-1]:
+                field.setDecimals(3)
+                field.setRange(-1e9, 1e9)
+                field.setSingleStep(STEP)
+                field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
+                field.setMinimumWidth(7 * theme.SPACING)
+                field.valueChanged.connect(self._tell)
+                row.addWidget(field, 1)
+        self.whole = self._button("Whole scan", self.whole_requested)
+        self.selection = self._button("Selection", self.selection_requested)
+        self.close_ = self._button("Off", self.closed)
+        for button in (self.whole, self.selection, self.close_):
+            row.addWidget(button)
+        self.hide()
+
+    def apply(self, state: ClipState) -> None:
+        """Show a state."""
+        self.setVisible(state.box is not None)
+        self.selection.setEnabled(state.has_selection)
+        if state.box is None or state.cloud is None:
+            return
+        self._origin = state.cloud.origin
+        with self._applying:
+            for axis, name in enumerate(describe.axis_names(state.cloud)):
+                self._names[axis].setText(name)
+                for side, local in enumerate((state.box.low, state.box.high)):
+                    field = self.ends[axis][side]
+                    field.setAccessibleName(f"Clip box, {('lower', 'upper')[side]} {name}")
+                    field.setToolTip(f"{('Lower', 'Upper')[side]} end along {name}, metres")
+                    field.setValue(local[axis] + float(self._origin[axis]))
+
+    def _button(self, text: str, signal: Signal) -> QToolButton:
+        button = QToolButton()
+        button.setText(text)
+        button.setAutoRaise(True)
+        button.clicked.connect(signal)
+        return button
+
+    def _tell(self) -> None:
+        if self._applying:
+            return
+        low, high = (
+            tuple(self.ends[axis][side].value() - float(self._origin[axis]) for axis in range(3))
+            for side in (0, 1)
+        )
+        self.changed.emit(Box(low, high))
