@@ -46,7 +46,7 @@ def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
 
 def mean_ovality(contour: Contour) -> tuple[float, float]:
     """Ovality of the mean section of the element and its standard deviation, ratios."""
-    pull = contour.basis.mean(axis=0)
+    pull = contour.basis.mean
     mean = (pull @ contour.coefficients)[3:5]
     covariance = np.einsum("a,akbl,b->kl", pull, contour.covariance, pull)[3:5, 3:5]
     variance = float(np.trace(covariance)) / 2

@@ -10,11 +10,14 @@ arc cannot tell two terms apart, a weak prior (a random walk along the knots) do
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from pipecore._kernels import contour as kernels
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
@@ -38,19 +41,44 @@ CAUCHY, TUKEY = 2.4, 4.7
 
 
 @dataclass(frozen=True, eq=False)
+class Basis:
+    """Cubic splines at the rows of a grid.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (rows,)
+        The first of the four splines that reach each row.
+    values : ndarray, shape (rows, 4)
+        Their values there.
+    n_splines : int
+    """
+
+    first: NDArray[np.int64]
+    values: Array
+    n_splines: int
+
+    @property
+    def mean(self) -> Array:
+        """Mean value of every spline over the rows, shape (splines,)."""
+        total = np.zeros(self.n_splines)
+        np.add.at(total, self.first[:, None] + np.arange(4), self.values)
+        return total / len(self.first)
+
+
+@dataclass(frozen=True, eq=False)
 class Contour:
     """A fitted contour on a grid.
 
     Parameters
     ----------
     grid : Grid
-    basis : ndarray, shape (rows, splines)
+    basis : Basis
     coefficients : ndarray, shape (splines, terms)
     covariance : ndarray, shape (splines, terms, splines, terms)
     """
 
     grid: Grid
-    basis: Array
+    basis: Basis
     coefficients: Array
     covariance: Array
 
@@ -59,33 +87,34 @@ class Contour:
         """Three, or five with ovality."""
         return int(self.coefficients.shape[1])
 
-    @property
+    @cached_property
     def terms(self) -> Array:
         """Coefficients at every row, metres, shape (rows, terms)."""
-        return np.asarray(self.basis @ self.coefficients)
+        reached = self.coefficients[self.basis.first[:, None] + np.arange(4)]
+        return np.asarray(np.einsum("ra,rak->rk", self.basis.values, reached))
 
-    @property
+    @cached_property
     def term_covariance(self) -> Array:
         """Covariance of the coefficients at every row, shape (rows, terms, terms)."""
         n = self.n_terms
-        result = np.empty((len(self.basis), n, n))
-        for k in range(n):
-            for m in range(n):
-                half = self.basis @ self.covariance[:, k, :, m]
-                result[:, k, m] = np.sum(half * self.basis, axis=1)
+        result = np.empty((len(self.basis.first), n, n))
+        kernels.row_covariances(self.basis.first, self.basis.values, self.covariance, result)
         return result
 
-    @property
+    @cached_property
     def height(self) -> Array:
         """Height of the contour above the fitted surface per cell, metres."""
-        return np.asarray(self.terms @ harmonics(self.grid.clocks, self.n_terms).T)
+        result = np.empty(self.grid.shape)
+        phi = harmonics(self.grid.clocks, self.n_terms)
+        kernels.heights(self.basis.first, self.basis.values, phi, self.coefficients, result)
+        return result
 
-    @property
+    @cached_property
     def sd(self) -> Array:
         """Standard deviation of `height` per cell, metres."""
         phi = harmonics(self.grid.clocks, self.n_terms)
         pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
-        variance = self.term_covariance.reshape(len(self.basis), -1) @ pairs.T
+        variance = self.term_covariance.reshape(len(self.basis.first), -1) @ pairs.T
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
@@ -100,13 +129,15 @@ def oval_knot_diameters(grid: Grid) -> float:
     return float(np.clip(OVAL_KNOTS / (2 * grid.radius), *OVAL_KNOT_DIAMETERS))
 
 
-def spline_basis(grid: Grid, knot_diameters: float) -> Array:
-    """Cubic splines with equal knots at the rows of a grid, shape (rows, splines)."""
+def spline_basis(grid: Grid, knot_diameters: float) -> Basis:
+    """Cubic splines with equal knots at the rows of a grid."""
     wanted = grid.length / (2 * grid.radius * knot_diameters)
     intervals = int(np.clip(np.ceil(wanted), 1, MAX_INTERVALS))
     step = grid.length / intervals
     knots = np.arange(-3, intervals + 4) * step
-    return np.asarray(BSpline.design_matrix(grid.chainages, knots, 3).toarray())
+    table = BSpline.design_matrix(grid.chainages, knots, 3)
+    first = table.indices.reshape(-1, 4)[:, 0].astype(np.int64)
+    return Basis(first, table.data.reshape(-1, 4), table.shape[1])
 
 
 def fit_contour(
@@ -131,65 +162,48 @@ def fit_contour(
         Whether the radius is the same along the whole length.
     """
     basis = spline_basis(grid, knot_diameters)
-    n_splines = basis.shape[1]
     phi = harmonics(grid.clocks, n_terms)
-    pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
-    prior = _prior_precision(grid, n_splines, n_terms, knot_diameters, constant_radius)
+    prior = _prior_band(grid, basis.n_splines, n_terms, knot_diameters, constant_radius)
     used = np.isfinite(variance) & np.isfinite(height)
     used &= inner_rows(grid)[:, None]
     y = np.where(used, height, 0.0)
     base = np.where(used, 1.0 / (np.where(used, variance, 1.0) + FLOOR**2), 0.0)
 
-    weight = base
-    for loss in [*[_cauchy] * 6, *[_tukey] * 6, None]:
-        moments = (weight @ pairs).reshape(-1, n_terms, n_terms)
-        right = (weight * y) @ phi
-        normal = _normal_matrix(basis, moments) + prior
-        size = n_splines * n_terms
-        factor = cho_factor(normal.reshape(size, size))
-        solution = cho_solve(factor, (basis.T @ right).ravel()).reshape(n_splines, n_terms)
-        if loss is None:
+    splines = basis.first, basis.values
+    weight, residuals = base.copy(), np.empty(grid.shape)
+    size = basis.n_splines * n_terms
+    right = np.empty(size)
+    for cauchy in [*[CAUCHY] * 6, *[0.0] * 6, None]:
+        band = prior.copy()
+        kernels.normal_equations(*splines, phi, y, weight, band, right)
+        factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False), True
+        solution = cho_solve_banded(factor, right, check_finite=False).reshape(-1, n_terms)
+        if cauchy is None:
             break
-        residual = (y - basis @ solution @ phi.T) * np.sqrt(base)
-        spread = 1.4826 * float(np.median(np.abs(residual[used]))) if used.any() else 1.0
-        weight = base * loss(residual / max(spread, 1.0))
-    covariance = cho_solve(factor, np.eye(size)).reshape(n_splines, n_terms, n_splines, n_terms)
-    return Contour(grid, basis, solution, covariance)
+        spread = kernels.scaled_residuals(*splines, phi, solution, y, base, residuals)
+        kernels.reweight(residuals, base, max(spread, 1.0), cauchy, TUKEY, weight)
+    covariance = cho_solve_banded(factor, np.eye(size), overwrite_b=True, check_finite=False)
+    shape = (basis.n_splines, n_terms)
+    return Contour(grid, basis, solution, np.ascontiguousarray(covariance).reshape(*shape, *shape))
 
 
-def _normal_matrix(basis: Array, moments: Array) -> Array:
-    """Σ over rows of splines ⊗ splines ⊗ moments, shape (splines, terms, splines, terms)."""
-    n_splines, n_terms = basis.shape[1], moments.shape[1]
-    normal = np.empty((n_splines, n_terms, n_splines, n_terms))
-    # One product of matrices per pair of terms is far quicker than one einsum over all.
-    for k in range(n_terms):
-        for m in range(n_terms):
-            normal[:, k, :, m] = basis.T @ (moments[:, k, m, None] * basis)
-    return normal
-
-
-def _cauchy(residual: Array) -> Array:
-    return 1.0 / (1.0 + (residual / CAUCHY) ** 2)
-
-
-def _tukey(residual: Array) -> Array:
-    return np.clip(1.0 - (residual / TUKEY) ** 2, 0.0, None) ** 2
-
-
-def _prior_precision(
+def _prior_band(
     grid: Grid, n_splines: int, n_terms: int, knot_diameters: float, constant_radius: bool
 ) -> Array:
-    """Inverse variances of the levels and of the steps from knot to knot."""
+    """Inverse variances of the levels and of the steps from knot to knot, as a lower band."""
     interval = grid.length / (n_splines - 3)
     walk = WALK_PRIOR * grid.radius * np.sqrt(interval / (4 * grid.radius))
-    steps = np.diff(np.eye(n_splines), axis=0)
-    precision = np.zeros((n_splines, n_terms, n_splines, n_terms))
+    n_steps = np.full(n_splines, 2.0)
+    n_steps[[0, -1]] = 1.0
+    band = np.zeros((4 * n_terms, n_splines * n_terms))
     for k in range(n_terms):
         # A radius held constant leaves the centre well known: it needs no prior to speak of.
         freedom = (1e-3 if k == 0 else 10.0) if constant_radius else 1.0
-        precision[:, k, :, k] = steps.T @ steps / (walk * freedom) ** 2
-        precision[:, k, :, k] += np.eye(n_splines) / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
-    return precision
+        precision = 1.0 / (walk * freedom) ** 2
+        band[0, k::n_terms] = n_steps * precision
+        band[0, k::n_terms] += 1.0 / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
+        band[n_terms, k : -n_terms or None : n_terms] = -precision
+    return band
 
 
 def inner_rows(grid: Grid) -> Flags:
