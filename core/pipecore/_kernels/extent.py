@@ -15,7 +15,8 @@ def upper_medians(values, group, medians):
     ordered = values[members]
     for k in range(medians.shape[0]):
         a, b = starts[k], starts[k + 1]
-        medians[k] = np.sort(ordered[a:b])[(b - a) // 2] if b > a else math.inf
+        middle = (b - a) // 2
+        medians[k] = np.partition(ordered[a:b], middle)[middle] if b > a else math.inf
 
 
 @njit(cache=True, nogil=True)

@@ -229,9 +229,11 @@ def points_on(
             i = members[m]
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
+            is_on = abs(residual) < band and is_free[i]
+            if not (is_on or residual < -depth):
+                continue
             cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
-            is_on = is_free[i] and abs(residual) < band
-            if not abs(cosine) > min_cos or not (is_on or residual < -depth):
+            if not abs(cosine) > min_cos:
                 continue
             chainage, up, right = across_axis(axis, x, y, z)
             rho, clock = polar(up, right)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
+from pipecore.elements.ahead import refine_in_turn
 from pipecore.elements.fittings import (
     End,
     flanges,
@@ -117,9 +118,7 @@ def refine_pieces(
     """
     keeper = _Keeper(nearby, settings)
     spheres, straights, rest = _by_support(pieces)
-    for i, piece in enumerate(spheres + straights):
-        progress.update("elements", 0.3 + 0.35 * i / len(spheres + straights))
-        keeper.try_piece(piece)
+    keeper.try_pieces(spheres + straights, progress, (0.3, 0.65))
     progress.update("elements", 0.65)
     joinable = list(keeper.fitted)
     for piece, ends in propose_bends(joinable, nearby):
@@ -127,9 +126,7 @@ def refine_pieces(
         keeper.try_piece(piece, between=ends)
     for piece, ends in propose_reducers(joinable):
         keeper.try_piece(piece, between=ends)
-    for i, piece in enumerate(rest):
-        progress.update("elements", 0.7 + 0.25 * i / len(rest))
-        keeper.try_piece(piece)
+    keeper.try_pieces(rest, progress, (0.7, 0.95))
     for piece in propose_flanges(list(keeper.fitted), nearby, keeper.is_free):
         progress.update("elements", 0.97)
         keeper.try_piece(piece)
@@ -167,6 +164,17 @@ class _Keeper:
         self.links: list[tuple[int, int]] = []
         self._joined: set[End] = set()
 
+    def try_pieces(
+        self, pieces: list[Piece], progress: Progress, span: tuple[float, float]
+    ) -> None:
+        """Refine pieces, several at once, and keep those that hold in their turn."""
+
+        def refine(piece: Piece, used: list[NDArray[np.intp]]) -> Fitted | None:
+            return self._refine(piece, self.is_free, used)
+
+        for _, found in refine_in_turn(pieces, refine, self.is_free, progress, span):
+            self._keep_if_it_holds(found)
+
     def try_piece(self, piece: Piece, between: tuple[End, End] | None = None) -> None:
         """Refine a piece and keep it if it holds.
 
@@ -180,12 +188,25 @@ class _Keeper:
             usable = usable.copy()
             for i, _ in between:
                 usable[self.fitted[i].own] = True
-        found = refine_piece(
+        self._keep_if_it_holds(self._refine(piece, usable), between)
+
+    def _refine(
+        self,
+        piece: Piece,
+        usable: NDArray[np.bool_],
+        used: list[NDArray[np.intp]] | None = None,
+    ) -> Fitted | None:
+        return refine_piece(
             piece,
             self._nearby,
             usable,
             lambda rough: is_credible(rough, self._nearby, self._settings, ROUGH),
+            used,
         )
+
+    def _keep_if_it_holds(
+        self, found: Fitted | None, between: tuple[End, End] | None = None
+    ) -> None:
         if found is None or not is_credible(found, self._nearby, self._settings):
             return
         if between is not None:

@@ -16,7 +16,7 @@ from pipecore._kernels import pieces as kernels
 from pipecore.axes import join_centres
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.ellipses import Ellipses
-from pipecore.geometry import unit
+from pipecore.geometry import cross, unit
 from pipecore.progress import Progress
 
 Array = NDArray[np.float64]
@@ -235,16 +235,16 @@ def _take_arcs(ellipses: Ellipses, members: NDArray[np.intp]) -> list[Piece]:
 
 def arc_angles(model: ArcSurface, points: Array) -> Array:
     """Angle of points about the arc's normal, from a fixed direction in its plane, in 0 … 2π."""
-    e1 = unit(np.cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
-    e2 = np.cross(model.normal, e1)
+    e1 = unit(cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
+    e2 = cross(model.normal, e1)
     q = points - model.centre
     return np.mod(np.arctan2(q @ e2, q @ e1), 2 * np.pi)
 
 
 def arc_direction(model: ArcSurface, angle: float) -> Array:
     """Unit vector from the centre at an angle of `arc_angles`."""
-    e1 = unit(np.cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
-    return np.asarray(np.cos(angle) * e1 + np.sin(angle) * np.cross(model.normal, e1))
+    e1 = unit(cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
+    return np.asarray(np.cos(angle) * e1 + np.sin(angle) * cross(model.normal, e1))
 
 
 def arc_extent(model: ArcSurface, points: Array) -> tuple[float, float, NDArray[np.intp]]:

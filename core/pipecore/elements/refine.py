@@ -25,7 +25,7 @@ from pipecore.elements.surfaces import (
     fit_surface,
 )
 from pipecore.ellipses import radius_sd_factor
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import ArcAxis, LineAxis, cross
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -94,6 +94,7 @@ def refine_piece(
     nearby: NearbyPoints,
     is_free: Flags,
     is_promising: Callable[[Fitted], bool] = lambda fitted: True,
+    used: list[Indices] | None = None,
 ) -> Fitted | None:
     """Fit a piece's surface to the cloud's points and find how far it reaches.
 
@@ -107,14 +108,17 @@ def refine_piece(
         Thinned points that no other element has taken.
     is_promising : callable
         Asked before the last round, which alone uses all points: most pieces end there.
+    used : list, optional
+        The free points that had a say are added to it.
 
     Returns
     -------
     Fitted or None
         None where the points do not carry the surface.
     """
+    used = [] if used is None else used
     if isinstance(piece.model, SphereSurface):
-        return _refine_sphere(piece.model, nearby, is_free, is_promising)
+        return _refine_sphere(piece.model, nearby, is_free, is_promising, used)
     model = piece.model
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     axis = axis_between(model, piece.low, piece.high)
@@ -128,6 +132,7 @@ def refine_piece(
             model, axis, margin, is_free,
             band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
         )  # fmt: skip
+        used.append(near.own)
         chainage, clock = near.chainage, near.clock
         spacing = nearby.usual_spacing(near.own)
         extent = find_extent(
@@ -176,7 +181,7 @@ def axis_through(model: LineSurface | ArcSurface, ends: Array) -> LineAxis | Arc
         return model.axis_between(float(low), float(high))
     start, end = (e - model.centre for e in ends)
     axis = model.axis_from(start, 0.0)
-    ahead = np.cross(axis.normal, axis.towards_start)
+    ahead = cross(axis.normal, axis.towards_start)
     angle = float(np.mod(np.arctan2(end @ ahead, end @ axis.towards_start), 2 * np.pi))
     return model.axis_from(start, angle)
 
@@ -244,6 +249,7 @@ def _refine_sphere(
     nearby: NearbyPoints,
     is_free: Flags,
     is_promising: Callable[[Fitted], bool],
+    used: list[Indices],
 ) -> Fitted | None:
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     fitted = None
@@ -252,12 +258,14 @@ def _refine_sphere(
         if is_final and not (fitted and is_promising(fitted)):
             return None
         own = nearby.on_sphere(model, is_free, band=_band(sigma), min_cos=RADIAL_COS)
+        used.append(own)
         fit = _fit_to(model, own, nearby, 3.0 * sigma, is_final)
         if fit is None:
             return None
         model = fit.model
         sigma = max(fit.sigma, 0.0005)
-        fitted = _fitted_sphere(fit, own, nearby)
+        if round_ > 0:
+            fitted = _fitted_sphere(fit, own, nearby)
     return fitted
 
 

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore import parallel
+from pipecore.elements.refine import MAX_FIT_POINTS
 from pipecore.errors import CancelledError, SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.io import read
@@ -148,13 +149,28 @@ def test_that_shuffled_points_give_the_same_elements(simulated, result, rng):
     cloud = simulated.cloud
     shuffled = rng.permutation(len(cloud))
     again = detect(PointCloud(cloud.origin, np.ascontiguousarray(cloud.xyz[shuffled])))
-    assert [e.kind for e in again.elements] == [e.kind for e in result.elements]
-    for a, b in zip(again.elements, result.elements, strict=True):
-        assert a.radius == pytest.approx(b.radius, abs=2e-5)
-        assert_allclose(a.axis.start, b.axis.start, atol=2e-3)
-        assert_allclose(a.axis.end, b.axis.end, atol=2e-3)
+    assert_same(again, result)
     same = again.segment_id == result.segment_id[shuffled]
     assert same.all()
+
+
+def test_that_elements_of_very_many_points_do_not_depend_on_threads_or_order(rng):
+    # More points than an element is fitted to: the sample of them must not depend on either.
+    axis = LineAxis(np.zeros(3), random_rotation(rng)[0], 0.8)
+    cloud = cloud_of(tube(rng, axis, 0.09, spacing=0.002, noise=0.001))
+    assert len(cloud) > 1.5 * MAX_FIT_POINTS
+    settings = Settings().replace({"thinning.voxel_mm": 8.0})
+    result = detect(cloud, settings)
+    assert max(e.n_points for e in result.elements) > MAX_FIT_POINTS
+    shuffled = rng.permutation(len(cloud))
+    mixed = PointCloud(cloud.origin, np.ascontiguousarray(cloud.xyz[shuffled]))
+    assert_same(detect(mixed, settings), result)
+    before = parallel.threads()
+    try:
+        parallel.set_threads(1 if before > 1 else 2)
+        assert_same(detect(cloud, settings), result)
+    finally:
+        parallel.set_threads(before)
 
 
 def small_pipe(rng) -> PointCloud:
