@@ -39,8 +39,11 @@ NEEDS_RESULT = {
 }
 
 
-def step(undo_text: str) -> Callable[[Command], Command]:
-    """Mark a command as a step of the history, with what its undoing is called."""
+def step(undo_text: str | Callable[..., str]) -> Callable[[Command], Command]:
+    """Mark a command as a step of the history, with what its undoing is called.
+
+    A function is given what the command is, before it is carried out.
+    """
 
     def mark(command: Command) -> Command:
         command.undo_text = undo_text  # type: ignore[attr-defined]
@@ -355,12 +358,7 @@ def isolate(document: Document) -> Document:
     result, selection = document.result, document.selection
     if result is None or selection == Selection():
         return document
-    kept = {
-        e.element_id
-        for e in result.elements
-        if (e.element_id == selection.element_id if selection.element_id else False)
-        or (not selection.element_id and e.run_id == selection.run_id)
-    }
+    kept = set(selecting.elements_of(result, selection))
     hidden = frozenset(e.element_id for e in result.elements) - kept
     return set_view(document, hidden_elements=hidden)
 

@@ -77,9 +77,13 @@ class Selection:
     element_id: int = NO_ID
     deformation_id: int = NO_ID
     profile: ProfileKey | None = None
+    others: frozenset[int] = frozenset()
+    """More elements, for what is done with several; everything is shown of `element_id`."""
 
     def parent(self) -> "Selection":
         """What Esc goes to: profile → deformation → element → run → nothing."""
+        if self.others:
+            return replace(self, others=frozenset())
         if self.profile is not None:
             return replace(self, profile=None)
         if self.deformation_id:

@@ -36,6 +36,8 @@ class History:
         if after is before:
             return
         text = getattr(command, "undo_text", "")
+        if callable(text):
+            text = text(before, *args, **kwargs)
         if text:
             self._past.append(Revision(before, text))
             self._future.clear()

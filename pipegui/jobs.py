@@ -46,6 +46,20 @@ def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -
     return detect(cloud, settings, progress=progress)
 
 
+@dataclass(frozen=True, eq=False)
+class Edited:
+    """What became of a scan's result when it was changed by hand; `text` says what was done."""
+
+    cloud: PointCloud
+    before: Result
+    after: Result
+    text: str
+
+
+Change = Callable[[JobProgress], Result]
+"""Works out the next result."""
+
+
 @dataclass(frozen=True)
 class _Request:
     title: str
@@ -71,6 +85,8 @@ class Jobs(QObject):
     """A `Scan`."""
     detected = Signal(object, object)
     """The cloud and its `Result`."""
+    edited = Signal(object)
+    """`Edited`."""
     written = Signal(object)
     """Path of what was written."""
 
@@ -111,6 +127,16 @@ class Jobs(QObject):
             return self._detect(cloud, settings, progress)
 
         self._request(_Request("Detecting", work, lambda r: self.detected.emit(cloud, r)))
+
+    def edit(
+        self, title: str, text: str, cloud: PointCloud, before: Result, change: Change
+    ) -> None:
+        """Change a result by hand, where that takes its time."""
+
+        def done(after: Result) -> None:
+            self.edited.emit(Edited(cloud, before, after, text))
+
+        self._request(_Request(title, change, done))
 
     def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
         """Write something that takes its time."""

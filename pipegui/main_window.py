@@ -14,6 +14,7 @@ from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
 from pipegui.actions import VIEW_OPTIONS, Actions
 from pipegui.document import Background, Document, Scan, Tool
+from pipegui.edits import Edits, conditions
 from pipegui.history import History
 from pipegui.jobs import Jobs
 from pipegui.layout import LAYOUT_VERSION, Panels, arrange
@@ -51,6 +52,7 @@ class MainWindow(QMainWindow):
         self._state = ViewState()
         self.panels = Panels.make()
         self.menu_actions = MenuActions(self)
+        self.edits = Edits(self)
         self.actions_ = Actions(self, wiring.handlers(self))
         self.tool_bar = ToolBar(self.actions_)
         self.addToolBar(self.tool_bar)
@@ -202,13 +204,14 @@ class MainWindow(QMainWindow):
                 "hidden": bool(document.view.hidden_elements),
                 "busy": busy,
                 "idle": not busy,
+                **conditions(document),
                 "undo": bool(self.history.undo_text),
                 "redo": bool(self.history.redo_text),
             }
         )
         for name in ("undo", "redo"):
             what = getattr(self.history, f"{name}_text")
-            self.actions_[name].setText(f"{name.capitalize()} {what.lower()}".strip())
+            self.actions_[name].setText(f"{name.capitalize()} {what[:1].lower()}{what[1:]}".strip())
 
     # Qt
 

@@ -42,6 +42,13 @@ def of_spot(result: Result, element_id: int, chainage: float, clock: float) -> S
     return Selection(element.run_id, element_id, profile=profile)
 
 
+def elements_of(result: Result, selection: Selection) -> list[int]:
+    """Ids of the selected elements: one, several, or those of the selected run."""
+    if selection.element_id:
+        return sorted({selection.element_id, *selection.others})
+    return [e.element_id for e in result.elements if e.run_id == selection.run_id != NO_ID]
+
+
 def nearest_profile(
     result: Result, element_id: int, chainage: float, stack_id: int = OWN_STACK
 ) -> ProfileKey | None:

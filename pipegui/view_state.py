@@ -256,7 +256,7 @@ def resolve(document: Document) -> ViewState:
     return ViewState(
         window=WindowState(scan, view, selection != Selection()),
         scene=SceneState(
-            scan_key=f"{document.active}:{scan.name}" if scan else "",
+            scan_key=str(id(scan.cloud)) if scan else "",
             cloud=scan.cloud if scan else None,
             result=result,
             selection=selection,

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtGui import QGuiApplication
 
-from pipegui import commands, describe, view_commands
+from pipecore.types import ReviewState
+from pipegui import commands, describe, edit_commands, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
 
@@ -19,6 +20,7 @@ STANDARD_VIEWS = ("top", "bottom", "front", "back", "right", "left", "iso")
 def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
     """Return what each action of the menus does, by its name."""
     do, menu, scene = window.do, window.menu_actions, window.parts.scene
+    edits = window.edits
     found: dict[str, Callable[..., object]] = {
         "open": menu.open,
         "close_scan": lambda: do(commands.close_scan, window.document.active),
@@ -34,6 +36,19 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "coordinates": lambda _: do(view_commands.choose_tool, Tool.COORDINATES),
         "delete_measurement": lambda: do(view_commands.delete_measurement, -1),
         "delete_measurements": lambda: do(view_commands.delete_measurements),
+        "rename": edits.rename,
+        "delete": edits.delete,
+        "merge": edits.merge,
+        "split": edits.split,
+        "kind": edits.kind,
+        "size": edits.size,
+        "detect_around": edits.detect_around,
+        "detect_in_box": edits.detect_in_box,
+        "accept": lambda: edits.review(ReviewState.ACCEPTED),
+        "reject": lambda: edits.review(ReviewState.REJECTED),
+        "reopen": lambda: edits.review(ReviewState.OPEN),
+        "hide": edits.hide,
+        "zoom": scene.show_selection,
         "fit": scene.fit,
         "next_scan": lambda: do(commands.step_scan),
         "detect": window.detect,
@@ -73,6 +88,9 @@ def connect_panels(window: "MainWindow") -> None:
     panels.welcome.open_requested.connect(window.menu_actions.open)
     panels.welcome.demo_requested.connect(window.menu_actions.open_demo)
     panels.tree.chosen.connect(window.choose_in_tree)
+    panels.tree.marked.connect(lambda ids: do(edit_commands.mark_elements, ids))
+    panels.tree.renamed.connect(window.edits.take_name)
+    panels.tree.menu_requested.connect(window.edits.show_menu)
     panels.tree.visibility_changed.connect(lambda ids, hide: do(commands.set_hidden, ids, hide))
     panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
     panels.table.reviewed.connect(lambda ids, state: do(commands.set_review, ids, state))
@@ -146,4 +164,5 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.failed.connect(lambda message, details: tell(message, "error", details))
     jobs.scan_read.connect(window.take_scan)
     jobs.detected.connect(window.take_result)
+    jobs.edited.connect(window.edits.take)
     jobs.written.connect(lambda path: tell(f"Saved “{path}”."))

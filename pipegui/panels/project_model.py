@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import Enum
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import (
@@ -10,6 +11,7 @@ from PySide6.QtCore import (
     QObject,
     QPersistentModelIndex,
     Qt,
+    QTimer,
     Signal,
 )
 from PySide6.QtGui import QFont, QIcon
@@ -63,6 +65,8 @@ class ProjectModel(QAbstractItemModel):
 
     visibility_changed = Signal(object, bool)
     """Ids of elements, and whether they are to be hidden."""
+    renamed = Signal(int, object, int, str)
+    """Scan, kind and id of a node, and what it is to be called."""
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
@@ -194,8 +198,12 @@ class ProjectModel(QAbstractItemModel):
             return Qt.ItemFlag.NoItemFlags
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         node = self._node(index)
-        if index.column() == NAME and node.elements and node.scan_index == self._state.active:
+        is_active = node.scan_index == self._state.active
+        if index.column() == NAME and node.elements and is_active:
             flags |= Qt.ItemFlag.ItemIsUserCheckable
+        is_named = node.kind is NodeKind.SCAN or (node.kind is NodeKind.ELEMENT and is_active)
+        if index.column() == NAME and is_named:
+            flags |= Qt.ItemFlag.ItemIsEditable
         return flags
 
     def data(self, index: Index, role: int = Role.DisplayRole) -> Any:
@@ -205,6 +213,8 @@ class ProjectModel(QAbstractItemModel):
         node = self._node(index)
         value: Any = None
         match role:
+            case Role.EditRole if index.column() == NAME:
+                value = node.text
             case Role.DisplayRole:
                 badge = str(len(node.badge)) if node.kind is NodeKind.ELEMENT and node.badge else ""
                 value = (node.text, node.radius, badge)[index.column()]
@@ -245,7 +255,13 @@ class ProjectModel(QAbstractItemModel):
         return Qt.CheckState.Unchecked if all_hidden else Qt.CheckState.PartiallyChecked
 
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
-        """Take a click on a check box: it becomes a command, which comes back as a state."""
+        """Take a click on a check box or a new name: it becomes a command."""
+        if role == Role.EditRole and self.flags(index) & Qt.ItemFlag.ItemIsEditable:
+            node = self._node(index)
+            # The rows are made anew for it, which the editor of this one must not live to see.
+            tell = partial(self.renamed.emit, node.scan_index, node.kind, node.item_id, str(value))
+            QTimer.singleShot(0, self, tell)
+            return True
         if role != Role.CheckStateRole or not self.flags(index) & Qt.ItemFlag.ItemIsUserCheckable:
             return False
         hide = Qt.CheckState(value) == Qt.CheckState.Unchecked
@@ -279,6 +295,11 @@ class ProjectModel(QAbstractItemModel):
         result = self._state.scans[scan_index].result
         ids = [e.element_id for e in result.elements if e.run_id == run_id] if result else []
         return (NodeKind.ELEMENT, ids[0]) if len(ids) == 1 else (NodeKind.RUN, run_id)
+
+    def branches(self) -> list[QModelIndex]:
+        """Return the nodes that hold others."""
+        nodes = [node for node in self._nodes[1:] if node.children]
+        return [self.createIndex(node.row, NAME, node.number) for node in nodes]
 
     def spanned(self) -> list[QModelIndex]:
         """Return the nodes whose name may take the whole width."""

@@ -1,7 +1,16 @@
 """The project panel: a tree of scans, runs, elements and deformations."""
 
-from PySide6.QtCore import QItemSelectionModel, QModelIndex, Signal
+from PySide6.QtCore import (
+    QItemSelection,
+    QItemSelectionModel,
+    QModelIndex,
+    QPoint,
+    Qt,
+    QTimer,
+    Signal,
+)
 from PySide6.QtWidgets import (
+    QAbstractItemView,
     QHeaderView,
     QLineEdit,
     QStackedLayout,
@@ -11,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipegui import theme
+from pipegui.document import Selection
 from pipegui.panels.project_model import BADGE, NAME, RADIUS, NodeKind, ProjectModel
 from pipegui.panels.widgets import Applying, EmptyHint
 from pipegui.view_state import TreeState
@@ -23,6 +33,12 @@ class ProjectTree(QWidget):
 
     chosen = Signal(int, object, int)
     """Scan, `NodeKind` and id of what the user selected."""
+    marked = Signal(object)
+    """Ids of all elements that are selected, where there are several."""
+    renamed = Signal(int, object, int, str)
+    """Scan, `NodeKind` and id of what the user named, and the name."""
+    menu_requested = Signal(object, QPoint)
+    """`NodeKind` of the row under the cursor, and where on the screen."""
     visibility_changed = Signal(object, bool)
     """Ids of elements, and whether they are to be hidden."""
 
@@ -32,6 +48,7 @@ class ProjectTree(QWidget):
         self._applying = Applying()
         self.model = ProjectModel(self)
         self.model.visibility_changed.connect(self.visibility_changed)
+        self.model.renamed.connect(self.renamed)
         self.view = QTreeView()
         self.view.setAccessibleName("Project")
         self.view.setModel(self.model)
@@ -44,7 +61,11 @@ class ProjectTree(QWidget):
         header.setSectionResizeMode(RADIUS, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(BADGE, QHeaderView.ResizeMode.ResizeToContents)
         header.setMinimumSectionSize(4 * theme.SPACING)
-        self.view.selectionModel().currentChanged.connect(self._tell)
+        self.view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.view.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.view.customContextMenuRequested.connect(self._request_menu)
+        self.view.selectionModel().selectionChanged.connect(self._tell)
         self.filter = QLineEdit()
         self.filter.setPlaceholderText("Filter by name")
         self.filter.setAccessibleName("Filter the project by name")
@@ -65,9 +86,13 @@ class ProjectTree(QWidget):
         """Show a state."""
         before, self._state = self._state, state
         with self._applying:
+            closed = self._closed()
             is_new = self.model.apply(state)
             if is_new:
                 self.view.expandToDepth(2)
+                for index in self.model.branches():
+                    if self.model.what(index) in closed:
+                        self.view.collapse(index)
                 for index in self.model.spanned():
                     self.view.setFirstColumnSpanned(index.row(), index.parent(), True)
                 self._filter(self.filter.text())
@@ -90,16 +115,62 @@ class ProjectTree(QWidget):
             is_any_shown = is_any_shown or is_shown
         return is_any_shown
 
+    def _closed(self) -> set[tuple[int, NodeKind, int]]:
+        """What the user has closed of the branches."""
+        view, branches = self.view, self.model.branches()
+        return {self.model.what(index) for index in branches if not view.isExpanded(index)}
+
     def _show_selection(self) -> None:
         index = self.model.index_of(self._state.active, self._state.selection)
         selection = self.view.selectionModel()
         flags = QItemSelectionModel.SelectionFlag
-        if index.isValid():
-            selection.setCurrentIndex(index, flags.ClearAndSelect | flags.Rows)
-            self.view.scrollTo(index)
-        else:
-            selection.clear()
+        if not index.isValid():
+            # Nothing of a scan is selected: then its own row may be.
+            current = self.view.currentIndex()
+            kinds = (self._state.active, NodeKind.SCAN)
+            if not current.isValid() or self.model.what(current)[:2] != kinds:
+                selection.clear()
+            return
+        wanted = QItemSelection(index, index)
+        for element_id in self._state.selection.others:
+            other = self.model.index_of(self._state.active, Selection(element_id=element_id))
+            wanted.select(other, other)
+        selection.select(wanted, flags.ClearAndSelect | flags.Rows)
+        selection.setCurrentIndex(index, flags.NoUpdate)
+        self.view.scrollTo(index)
 
-    def _tell(self, current: QModelIndex, previous: QModelIndex) -> None:
-        if current.isValid() and not self._applying:
-            self.chosen.emit(*self.model.what(current))
+    def _tell(self) -> None:
+        """Tell what was selected; where there are several elements, the current one leads."""
+        if self._applying:
+            return
+        rows = self.view.selectionModel().selectedRows(NAME)
+        if not rows:
+            return
+        current = self.view.currentIndex().siblingAtColumn(NAME)
+        lead = current if current in rows else rows[-1]
+        selected = [self.model.what(row) for row in rows]
+        what = self.model.what(lead)
+        self.chosen.emit(*what)
+        scan, kind, _ = what
+        if len(rows) > 1 and kind is NodeKind.ELEMENT:
+            self.marked.emit([i for s, k, i in selected if k is kind and s == scan])
+        elif len(rows) > 1:
+            # Only elements can be selected together. Qt is still in the midst of selecting.
+            QTimer.singleShot(0, self, self._reselect)
+
+    def _reselect(self) -> None:
+        with self._applying:
+            self._show_selection()
+
+    def _request_menu(self, position: QPoint) -> None:
+        index = self.view.indexAt(position)
+        if index.isValid():
+            _, kind, _ = self.model.what(index)
+            self.menu_requested.emit(kind, self.view.viewport().mapToGlobal(position))
+
+    def rename(self) -> None:
+        """Let the user type another name for the selected row."""
+        index = self.view.currentIndex().siblingAtColumn(NAME)
+        if index.isValid() and self.model.flags(index) & Qt.ItemFlag.ItemIsEditable:
+            self.view.setFocus()
+            self.view.edit(index)

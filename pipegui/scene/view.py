@@ -207,6 +207,10 @@ class SceneView(QWidget):
         """Fly to look at everything from a standard side, such as "top" or "iso"."""
         self._fly(self._fitted(poses.standard_view(self.canvas.pose, name)))
 
+    def show_selection(self) -> None:
+        """Move the camera to what is selected."""
+        self._aim(self._state)
+
     def view_direction(self) -> Array:
         """Unit vector in which the camera looks."""
         return self.canvas.pose.forward

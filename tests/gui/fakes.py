@@ -47,6 +47,9 @@ class FakeScene(FakeView):
     def fit(self) -> None:
         self.standard_views.append("fit")
 
+    def show_selection(self) -> None:
+        self.standard_views.append("selection")
+
     def view_direction(self) -> np.ndarray:
         return np.array([0.0, 0.6, -0.8])
 
