@@ -94,6 +94,15 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _option("show_labels", "Labels", "Name the deformations in the 3D view", "L"),
         _option("fly", "Fly to the selection", "Move the camera to what is selected"),
         _SEPARATOR,
+        _A("next_profile", "Next profile of the stack", "Go on to the next one", "", ".", "stack"),
+        _A(
+            "previous_profile",
+            "Previous profile of the stack",
+            "Go back to the one before",
+            "",
+            ",",
+            "stack",
+        ),
         _A(
             "clip",
             "Clip box",

@@ -310,9 +310,8 @@ def set_view(document: Document, **changes: Any) -> Document:
 
 def show_stack(document: Document, stack_id: int) -> Document:
     """Show one stack's profiles in colour; `NO_ID` goes back to the deviation."""
-    if stack_id == NO_ID:
-        return set_view(document, shown_stack=NO_ID, colour_by=ColourBy.DEVIATION)
-    return set_view(document, shown_stack=stack_id, colour_by=ColourBy.PROFILE)
+    colour_by = ColourBy.DEVIATION if stack_id == NO_ID else ColourBy.PROFILE
+    return set_view(document, shown_stack=stack_id, shown_profile=None, colour_by=colour_by)
 
 
 def set_colour(document: Document, colour_by: ColourBy) -> Document:
@@ -321,7 +320,7 @@ def set_colour(document: Document, colour_by: ColourBy) -> Document:
         stacks = document.result.stacks
         shown = document.view.shown_stack or (stacks[0].stack_id if stacks else NO_ID)
         return set_view(document, colour_by=colour_by, shown_stack=shown)
-    return set_view(document, colour_by=colour_by, shown_stack=NO_ID)
+    return set_view(document, colour_by=colour_by, shown_stack=NO_ID, shown_profile=None)
 
 
 def show_plot_stack(document: Document, stack_id: int) -> Document:

@@ -30,6 +30,13 @@ def count_profiles(result: Result) -> tuple[int, ...]:
     return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
 
 
+@lru_cache(maxsize=8)
+def profile_indices(result: Result, stack_id: int) -> NDArray[np.int32]:
+    """Return the profiles of a stack that have an accepted ellipse, in their order."""
+    profiles = result.profiles
+    return np.unique(profiles.profile_index[profiles.stack_id == stack_id])
+
+
 @lru_cache(maxsize=32)
 def deformations_of(result: Result, element_id: int) -> tuple[Deformation, ...]:
     """Return the deformations of one element."""

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QDockWidget, QMenu, QTabWidget, QVBoxLayout, QWidg
 from pipegui.panels.clip_bar import ClipBar
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.panels.message_bar import MessageBar
+from pipegui.panels.profile_bar import ProfileBar
 from pipegui.panels.project_tree import ProjectTree
 from pipegui.panels.properties import PropertiesPanel
 from pipegui.panels.settings_form import SettingsForm
@@ -36,6 +37,7 @@ class Panels:
     message: MessageBar
     welcome: Welcome
     clip: ClipBar
+    profiles: ProfileBar
     docks: dict[str, QDockWidget]
 
     @classmethod
@@ -50,6 +52,7 @@ class Panels:
             MessageBar(),
             Welcome(),
             ClipBar(),
+            ProfileBar(),
             {},
         )
 
@@ -80,6 +83,7 @@ def arrange(window: "MainWindow") -> None:
     column.setSpacing(0)
     column.addWidget(panels.message)
     column.addWidget(window.centre, 1)
+    column.addWidget(panels.profiles)
     column.addWidget(panels.clip)
     window.setCentralWidget(centre)
 

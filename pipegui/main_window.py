@@ -13,7 +13,7 @@ from pipecore.report.summary import summarise
 from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
 from pipegui.actions import VIEW_OPTIONS, Actions
-from pipegui.document import Background, Document, Scan, Tool
+from pipegui.document import Background, ColourBy, Document, Scan, Tool
 from pipegui.edits import Edits, conditions
 from pipegui.history import History
 from pipegui.jobs import Jobs
@@ -158,6 +158,7 @@ class MainWindow(QMainWindow):
             "settings": panels.settings.apply,
             "table": panels.table.apply,
             "clip": panels.clip.apply,
+            "profile_bar": panels.profiles.apply,
             "properties": self._apply_properties,
             "radius_plot": parts.radius_plot.apply,
             "section": parts.section.apply,
@@ -200,6 +201,7 @@ class MainWindow(QMainWindow):
                 "deformations": bool(document.result and document.result.deformations),
                 "selection": self._state.window.has_selection,
                 "escape": self._state.window.has_selection or view.tool is not Tool.SELECT,
+                "stack": view.colour_by is ColourBy.PROFILE and bool(view.shown_stack),
                 "measured": bool(view.measurements),
                 "hidden": bool(document.view.hidden_elements),
                 "busy": busy,

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipecore.geometry import Array, surface_points
 from pipecore.types import Element, PointCloud
+from pipegui import cuts
 from pipegui.commands import select_parent, select_point, set_view
 from pipegui.document import Box, Document, Measurement, Point, Tool
 
@@ -165,3 +166,25 @@ def _outline(element: Element, start: float, end: float) -> Array:
 def _triple(values: Array) -> Point:
     x, y, z = values.tolist()
     return x, y, z
+
+
+# The profiles of a stack, one by one
+
+
+def show_profile(document: Document, profile_index: int | None) -> Document:
+    """Show one profile of the stack that is shown; None: all."""
+    return set_view(document, shown_profile=profile_index)
+
+
+def step_stack_profile(document: Document, by: int) -> Document:
+    """Show the next (+1) or previous (-1) profile of the stack; the first if all are shown."""
+    result, view = document.result, document.view
+    if result is None or not view.shown_stack:
+        return document
+    indices = cuts.profile_indices(result, view.shown_stack)
+    if not len(indices):
+        return document
+    if view.shown_profile is None:
+        return show_profile(document, int(indices[0 if by > 0 else -1]))
+    place = int(np.searchsorted(indices, view.shown_profile)) + by
+    return show_profile(document, int(indices[min(max(place, 0), len(indices) - 1)]))

@@ -27,13 +27,14 @@ from pipecore.types import (
     Stack,
 )
 from pipegui import cuts, selecting
-from pipegui.document import Box, Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.document import Box, ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
 from pipegui.section_cut import SectionCut, cut_section
 
 Array = NDArray[np.float64]
 
 NO_PROFILES = Profiles.empty()
 NOTHING = np.empty(0)
+NO_INDICES = np.empty(0, np.int32)
 NO_POINTS = np.empty((0, 3))
 
 
@@ -206,6 +207,15 @@ class PropertiesState:
     profile: Profiles | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class ProfileBarState(_ComparedByParts):
+    """The profiles of the stack that is shown: those with an accepted ellipse, in order."""
+
+    indices: NDArray[np.int32] = field(default_factory=lambda: NO_INDICES)
+    shown: int | None = None
+    name: str = ""
+
+
 @dataclass(frozen=True)
 class ClipState:
     """The clip box in numbers."""
@@ -235,6 +245,7 @@ class ViewState:
     settings: Settings = Settings()
     table: TableState = TableState()
     clip: ClipState = ClipState()
+    profile_bar: ProfileBarState = ProfileBarState()
     properties: PropertiesState = PropertiesState()
     radius_plot: RadiusPlotState = RadiusPlotState()
     section: SectionState = SectionState()
@@ -275,8 +286,16 @@ def resolve(document: Document) -> ViewState:
         table=TableState(result, selection.deformation_id, scan.reviews if scan else {}),
         clip=ClipState(view.clip_box, scan.cloud if scan else None, selection != Selection()),
         properties=PropertiesState(scan, selection, profile),
+        profile_bar=_profile_bar(result, view),
         **_element_states(scan, selection, view, shown),
     )
+
+
+def _profile_bar(result: Result | None, view: ViewOptions) -> ProfileBarState:
+    if result is None or view.colour_by is not ColourBy.PROFILE or not view.shown_stack:
+        return ProfileBarState()
+    indices = cuts.profile_indices(result, view.shown_stack)
+    return ProfileBarState(indices, view.shown_profile, cuts.stack_name(result, view.shown_stack))
 
 
 def _element_states(

@@ -32,6 +32,8 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "go_up": lambda: do(view_commands.escape),
         "clip": lambda _: do(view_commands.switch_clip),
         "clip_to_selection": lambda: do(view_commands.clip_to_selection),
+        "next_profile": lambda: do(view_commands.step_stack_profile, 1),
+        "previous_profile": lambda: do(view_commands.step_stack_profile, -1),
         "measure": lambda _: do(view_commands.choose_tool, Tool.MEASURE),
         "coordinates": lambda _: do(view_commands.choose_tool, Tool.COORDINATES),
         "delete_measurement": lambda: do(view_commands.delete_measurement, -1),
@@ -111,6 +113,8 @@ def connect_panels(window: "MainWindow") -> None:
     panels.clip.whole_requested.connect(lambda: do(view_commands.clip_to_scan))
     panels.clip.selection_requested.connect(lambda: do(view_commands.clip_to_selection))
     panels.clip.closed.connect(lambda: do(commands.set_view, clip_box=None))
+    panels.profiles.chosen.connect(lambda i: do(view_commands.show_profile, i))
+    panels.profiles.stepped.connect(lambda by: do(view_commands.step_stack_profile, by))
     bar = window.tool_bar
     bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
 from pipegui.colour_maps import (
+    BLOCK,
     HEIGHT,
     INTENSITY,
     KINDS,
@@ -26,6 +27,7 @@ MUTED = {False: (217, 221, 227), True: (70, 76, 84)}
 """Points that the colouring says nothing about, on light and on dark background."""
 
 KIND_COLOUR = dict(zip(ElementKind, KINDS, strict=True))
+NO_CURVE = (128, 128, 128)
 SOUND = (157, 190, 217)
 """Where a pipe has no deformation, in the colours of the verdicts."""
 PROFILE_COLOURS = QUALITATIVE[[0, 1]]
@@ -203,6 +205,25 @@ def _by_profile(asked: _Asked) -> Colours:
     table = np.stack([faint, PROFILE_COLOURS]).astype(np.uint8)
     parity = stack.profile_index(asked.cloud.xyz[asked.rows]) % 2
     return table[(ids != NO_ID).astype(np.intp), parity]
+
+
+def profile_rows(cloud: PointCloud, stack: Stack, profile_index: int) -> NDArray[np.intp]:
+    """Return the indices in the cloud of the points in one profile."""
+    start = stack.offset + profile_index * stack.width
+    direction = stack.direction.astype(cloud.xyz.dtype)
+    # In blocks: beside a large cloud there is no room for a number for each point.
+    found = []
+    for first in range(0, len(cloud), BLOCK):
+        along = cloud.xyz[first : first + BLOCK] @ direction
+        found.append(first + np.flatnonzero((along >= start) & (along < start + stack.width)))
+    return np.concatenate(found)
+
+
+def profile_colours(cloud: PointCloud, result: Result, rows: NDArray[np.intp]) -> Colours:
+    """Return the colours of a profile's curves, each as its segment; muted where there is none."""
+    table = QUALITATIVE[_apart(cloud, result, ColourBy.SEGMENT)]
+    table[NO_ID] = NO_CURVE
+    return table[result.segment_id[rows]]
 
 
 def stack_of(result: Result, stack_id: int) -> Stack | None:

@@ -7,17 +7,25 @@ import pyvista as pv
 from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
-from pipecore.types import OWN_STACK, Element
+from pipecore.types import OWN_STACK, Element, Profiles
 from pipegui import theme
 from pipegui.document import Box, ColourBy
 from pipegui.scene import shapes
-from pipegui.scene.colouring import effective, visible_elements
+from pipegui.scene.colouring import (
+    effective,
+    profile_colours,
+    profile_rows,
+    stack_of,
+    visible_elements,
+)
 from pipegui.scene.point_layer import point_actor, set_planes
 from pipegui.view_state import SceneState
 
 MAX_HIGHLIGHTED = {False: 400_000, True: 20_000}
 """Points of the selected element that are drawn over the others, at rest and moving."""
-SURFACE_OPACITY = 0.35
+MAX_IN_PROFILE = 200_000
+SURFACE_OPACITY = 0.5
+SURFACE_COLOUR = "#7d9cc4"
 ACCENT_POINTS = {ColourBy.SEGMENT, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.RGB}
 """Colourings whose colours the selection may cover; others are measured values."""
 
@@ -50,6 +58,12 @@ class Decorations:
             self._replace("ellipses", self._ellipses(state))
         if selected or old.colour_by != new.colour_by or old.show_points != new.show_points:
             self._replace("highlight", self._highlight(state))
+        is_other_stack = (old.shown_stack, old.shown_profile) != (
+            new.shown_stack,
+            new.shown_profile,
+        )
+        if base or is_other_stack or old.colour_by != new.colour_by:
+            self._replace("stack profile", self._stack_profile(state))
         if everything or state.profile is not before.profile:
             self._replace("profile", self._profile(state))
 
@@ -93,7 +107,7 @@ class Decorations:
     def _surfaces(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         elements = visible_elements(state.result, state.view.hidden_elements)
         if state.view.show_surfaces and elements:
-            yield 0, _surface(shapes.surfaces(elements), QColor("#8fa3bd"))
+            yield 0, _surface(shapes.surfaces(elements), QColor(SURFACE_COLOUR))
 
     def _ellipses(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         selected = state.selection.element_id
@@ -107,7 +121,7 @@ class Decorations:
                 e.element_id for e in visible_elements(state.result, state.view.hidden_elements)
             ]
             mask = np.isin(profiles.element_id, shown) & (profiles.stack_id == OWN_STACK)
-            profiles = profiles[mask]
+            profiles = _thinned(profiles[mask])
         if len(profiles):
             yield 0, _lines(shapes.ellipse_lines(profiles), self._tint("text"), 1.0, 0.8)
 
@@ -127,6 +141,26 @@ class Decorations:
         yield 1, _lines(shapes.axis_lines((element,)), accent, 2.5)
         yield 1, _lines(shapes.end_rings(element), accent, 2.0)
 
+    def _stack_profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        """The one profile of a stack: its curves in their colours, and its ellipses."""
+        result, view = state.result, state.view
+        if result is None or view.shown_profile is None or view.colour_by is not ColourBy.PROFILE:
+            return
+        stack = stack_of(result, view.shown_stack)
+        if stack is None:
+            return
+        rows = profile_rows(state.cloud, stack, view.shown_profile)
+        rows = rows[:: -(-len(rows) // MAX_IN_PROFILE) or 1]
+        xyz = np.ascontiguousarray(state.cloud.xyz[rows], np.float32)
+        points = point_actor(xyz, profile_colours(state.cloud, result, rows))
+        points.GetProperty().SetPointSize(3.0)
+        yield 1, points
+        table = result.profiles
+        is_shown = table.profile_index == view.shown_profile
+        ring = shapes.ellipse_lines(table[is_shown & (table.stack_id == view.shown_stack)])
+        if ring.n_points:
+            yield 1, _lines(ring, self._tint("text"), 1.5, 0.8)
+
     def _profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         if state.profile is None:
             return
@@ -137,6 +171,14 @@ class Decorations:
         ring = shapes.ellipse_lines(state.profile)
         if ring.n_points:
             yield 1, _lines(ring, self._tint("accent"), 3.0)
+
+
+def _thinned(profiles: Profiles) -> Profiles:
+    """Profiles so far apart that their ellipses are seen one by one: half a radius."""
+    cell = np.floor(profiles.chainage / np.maximum(0.5 * profiles.radius, 1e-3))
+    cells = np.column_stack([profiles.element_id, np.nan_to_num(cell, nan=-1.0)])
+    _, first = np.unique(cells, axis=0, return_index=True)
+    return profiles[np.sort(first)]
 
 
 def selected_element(state: SceneState) -> Element | None:

@@ -6,7 +6,15 @@ import pytest
 from pipegui.colour_maps import DEVIATION, KINDS, QUALITATIVE, deviation_colours, rgb
 from pipegui.colours import VERDICT
 from pipegui.document import Box, ColourBy, ViewOptions
-from pipegui.scene.colouring import MUTED, SOUND, colour_points, effective, visible_points
+from pipegui.scene.colouring import (
+    MUTED,
+    SOUND,
+    colour_points,
+    effective,
+    profile_colours,
+    profile_rows,
+    visible_points,
+)
 from pipegui.scene.legend import make_legend
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
 from pipegui.scene.spreading import Spread
@@ -229,3 +237,20 @@ def test_that_the_first_points_are_spread_over_all_of_the_cloud():
     assert counts.max() < 300
     # Not every so manieth: that would show as stripes in a scan's rows.
     assert len(np.unique(np.diff(np.sort(first)))) > 500
+
+
+def test_that_a_profile_holds_the_points_of_its_slab_and_colours_them_by_segment():
+    stack = RESULT.stacks[0]
+    rows = profile_rows(CLOUD, stack, 40)
+    expected = np.flatnonzero(stack.profile_index(CLOUD.xyz) == 40)
+    # Points on the border may fall to either side in the points' own precision.
+    assert len(np.setxor1d(rows, expected)) <= 2
+    assert len(rows) > 20
+    colours = profile_colours(CLOUD, RESULT, rows)
+    for segment in np.unique(RESULT.segment_id[rows]):
+        assert len(np.unique(colours[RESULT.segment_id[rows] == segment], axis=0)) == 1
+
+
+def test_that_all_else_is_muted_where_one_profile_is_shown():
+    colours = colours_by(ColourBy.PROFILE, shown_stack=1, shown_profile=40)
+    assert (colours == MUTED[False]).all()

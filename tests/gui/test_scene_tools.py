@@ -1,12 +1,14 @@
 """Measuring and clipping in the 3D view, with a real mouse and the commands behind it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from pipegui import view_commands
-from pipegui.document import Box, Document, Measurement, Scan, Tool, ViewOptions
+from pipegui.document import Box, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene.measure_marks import lines_of
 from pipegui.scene.view import SceneView
@@ -230,3 +232,16 @@ def test_that_a_box_never_vanishes():
     box = view_commands.set_clip_box(document, Box((1.0, 5.0, 0.0), (1.0, 2.0, 3.0))).view.clip_box
     assert box.low == (1.0, 2.0, 0.0)
     assert box.high == pytest.approx((1.01, 5.0, 3.0))
+
+
+def test_that_one_profile_is_drawn_in_colour_over_dimmed_points(desk):
+    def n_coloured():
+        settle(desk.qtbot, desk.scene)
+        colours = picture(desk.scene)[:400]
+        return (np.ptp(colours, axis=2) > 60).sum()
+
+    plain = replace(STILL, colour_by=ColourBy.PROFILE, shown_stack=1, show_axes=False)
+    desk.do(lambda d: replace(d, view=replace(plain, shown_profile=10_000)))
+    before = n_coloured()
+    desk.do(lambda d: replace(d, view=replace(plain, shown_profile=60)))
+    assert n_coloured() > before + 100

@@ -36,3 +36,39 @@ def test_that_the_bar_clips_to_the_selection_and_back_and_off(detected, qtbot):
     qtbot.mouseClick(bar.close_, LEFT)
     assert detected.document.view.clip_box is None
     assert not bar.isVisible()
+
+
+@pytest.fixture
+def sliced(detected):
+    """The profiles of stack 1 are shown."""
+    detected.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
+    return detected
+
+
+def test_that_the_slider_comes_with_a_stack_and_goes_with_it(sliced):
+    bar = sliced.panels.profiles
+    assert bar.isVisible()
+    assert bar.all.isChecked()
+    sliced.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Unchecked)
+    assert not bar.isVisible()
+
+
+def test_that_slider_buttons_and_keys_go_from_profile_to_profile(sliced, qtbot):
+    bar, scene = sliced.panels.profiles, sliced.parts.scene
+    profiles = sliced.document.result.profiles
+    indices = np.unique(profiles.profile_index[profiles.stack_id == 1])
+    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    assert scene.state.view.shown_profile == indices[0]
+    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    qtbot.mouseClick(bar.next, LEFT)
+    assert scene.state.view.shown_profile == indices[2]
+    assert bar.place.text() == f"3 of {len(indices)}"
+    qtbot.keyClick(sliced, Qt.Key.Key_Comma)
+    assert bar.slider.value() == 1
+    bar.slider.setFocus()
+    qtbot.keyClick(bar.slider, Qt.Key.Key_End)
+    assert scene.state.view.shown_profile == indices[-1]
+    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    assert scene.state.view.shown_profile == indices[-1]
+    qtbot.mouseClick(bar.all, LEFT)
+    assert scene.state.view.shown_profile is None
