@@ -1,7 +1,8 @@
 """Measuring elements at full resolution: their deviations, deformations and normal stacks."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +10,17 @@ from numpy.typing import NDArray
 from pipecore.deformation import curvature_variations, find_deformations
 from pipecore.elements import BuiltElements, NearbyPoints
 from pipecore.elements.sections import cut_normal_stack
+from pipecore.parallel import for_items
 from pipecore.progress import Progress
 from pipecore.settings import DeformationSettings, EllipseFit
 from pipecore.types import NO_ID, Deformation, Element, Profiles
+
+Array = NDArray[np.float64]
+
+AT_ONCE = 32
+"""Elements whose points are held at once until they are given to them in their order."""
+N_SAMPLES = 16
+"""Places along an axis at which its neighbours are looked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,81 +61,136 @@ def measure_elements(
 
     `others` are not measured, but what touches an element there is no deformation of it.
     """
+    everything = built.elements + others
+    boxes = _boxes(everything)
     element_id = np.full(n_points, NO_ID, np.int32)
     deviation = np.full(n_points, np.nan, np.float32)
-    elements, profiles = [], []
-    deformations: list[Deformation] = []
-    for i, element in enumerate(built.elements):
-        progress.update("deformations", i / len(built.elements))
-        radius = max(element.radius, element.radius_end)
-        thinned = nearby.thinned(element.axis, radius, 0.5 * radius)
-        index, xyz, normals = nearby.of_cloud(thinned)
-        finding = find_deformations(
-            element,
-            xyz,
-            normals,
-            neighbours_of(element, built.elements + others),
-            settings,
-        )
-        own = index[finding.belongs]
-        # Where elements meet, a point is of the one that it fits better.
-        taken = element_id[own] != NO_ID
-        closer = ~taken | (np.abs(finding.deviation[finding.belongs]) < np.abs(deviation[own]))
-        element_id[own[closer]] = element.element_id
-        deviation[own[closer]] = finding.deviation[finding.belongs][closer]
-        spacing = nearby.usual_spacing(thinned)
-        section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
-        check = partial(progress.update, "deformations", (i + 0.5) / len(built.elements))
-        rows = cut_normal_stack(
-            element,
-            xyz[finding.belongs],
-            section_width,
-            spacing,
-            fit,
-            check,
-        )
-        rows = replace(
-            rows,
-            curvature_variation=curvature_variations(
-                element, xyz[finding.belongs], rows, section_width, check
-            ),
-        )
-        elements.append(
-            replace(
-                element,
-                n_points=len(own),
-                n_profiles=len(rows),
-                arc=float(np.median(rows.arc)) if len(rows) else element.arc,
-                ovality=finding.ovality,
-                ovality_sd=finding.ovality_sd,
-                straightness=finding.straightness,
-                not_measurable=finding.not_measurable,
-            )
-        )
-        profiles.append(rows)
-        deformations += finding.deformations
+    measured: list[_Measured] = []
+    n = len(built.elements)
+    for start in range(0, n, AT_ONCE):
+        batch: list[_Measured | None] = [None] * min(AT_ONCE, n - start)
+
+        def work(
+            i: int,
+            check: Callable[[], None],
+            start: int = start,
+            batch: list[_Measured | None] = batch,
+        ) -> None:
+            element = built.elements[start + i]
+            neighbours = neighbours_of(element, everything, boxes)
+            batch[i] = _measure(element, neighbours, nearby, width, settings, fit, check)
+
+        for_items(work, len(batch), "deformations", progress, (start / n, (start + len(batch)) / n))
+        for found in filter(None, batch):
+            _assign(found, element_id, deviation)
+            measured.append(replace(found, index=_NONE, deviation=_NONE))
     progress.update("deformations", 1.0)
     return Measurement(
-        tuple(elements),
-        Profiles.concatenate(profiles),
-        tuple(deformations),
+        tuple(m.element for m in measured),
+        Profiles.concatenate([m.profiles for m in measured]),
+        tuple(d for m in measured for d in m.deformations),
         element_id,
         deviation,
     )
 
 
-def neighbours_of(element: Element, elements: tuple[Element, ...]) -> list[Element]:
-    """Elements whose surfaces may come near: their axis passes within reach of its own."""
-    samples = element.axis.at(np.linspace(0.0, element.axis.length, 16))
-    step = element.axis.length / 15
+@dataclass(frozen=True, eq=False)
+class _Measured:
+    """One element with what was measured of it; its points with their deviations."""
+
+    element: Element
+    profiles: Profiles
+    deformations: tuple[Deformation, ...]
+    index: NDArray[np.intp]
+    deviation: NDArray[np.float32]
+
+
+_NONE: NDArray[Any] = np.empty(0)
+
+
+def _measure(
+    element: Element,
+    neighbours: list[Element],
+    nearby: NearbyPoints,
+    width: float,
+    settings: DeformationSettings,
+    fit: EllipseFit,
+    check: Callable[[], None],
+) -> _Measured:
     radius = max(element.radius, element.radius_end)
+    thinned = nearby.thinned(element.axis, radius, 0.5 * radius)
+    index, xyz, normals = nearby.of_cloud(thinned)
+    finding = find_deformations(element, xyz, normals, neighbours, settings)
+    check()
+    own = xyz[finding.belongs]
+    spacing = nearby.usual_spacing(thinned)
+    section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
+    rows = cut_normal_stack(element, own, section_width, spacing, fit, check)
+    variation = curvature_variations(element, own, rows, section_width, check)
+    rows = replace(rows, curvature_variation=variation)
+    complete = replace(
+        element,
+        n_points=len(own),
+        n_profiles=len(rows),
+        arc=float(np.median(rows.arc)) if len(rows) else element.arc,
+        ovality=finding.ovality,
+        ovality_sd=finding.ovality_sd,
+        straightness=finding.straightness,
+        not_measurable=finding.not_measurable,
+    )
+    return _Measured(
+        complete,
+        rows,
+        finding.deformations,
+        index[finding.belongs],
+        finding.deviation[finding.belongs],
+    )
+
+
+def _assign(
+    found: _Measured, element_id: NDArray[np.int32], deviation: NDArray[np.float32]
+) -> None:
+    """Give an element its points: where elements meet, a point is of the one it fits better."""
+    taken = element_id[found.index] != NO_ID
+    closer = ~taken | (np.abs(found.deviation) < np.abs(deviation[found.index]))
+    own = found.index[closer]
+    element_id[own] = found.element.element_id
+    deviation[own] = found.deviation[closer]
+
+
+def _boxes(elements: Sequence[Element]) -> tuple[Array, Array]:
+    """Lowest and highest coordinates of the elements' axes, each (n, 3)."""
+    low, high = np.empty((2, len(elements), 3))
+    for i, element in enumerate(elements):
+        samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
+        # Between its samples an arc leaves their box by less than half a step.
+        half_step = 0.5 * element.axis.length / (N_SAMPLES - 1)
+        low[i], high[i] = samples.min(axis=0) - half_step, samples.max(axis=0) + half_step
+    return low, high
+
+
+def neighbours_of(
+    element: Element, elements: Sequence[Element], boxes: tuple[Array, Array]
+) -> list[Element]:
+    """Elements whose surfaces may come near: their axis passes within reach of its own.
+
+    `boxes` are those of the elements' axes; most elements are far off by them alone.
+    """
+    samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
+    step = element.axis.length / (N_SAMPLES - 1)
+    radius = max(element.radius, element.radius_end)
+    radii = np.array([max(e.radius, e.radius_end) for e in elements])
+    # Within reach of an end along the axis, and of the axis across it.
+    furthest = (2.0 * (1.2 * (radius + radii) + step))[:, None]
+    low, high = boxes
+    apart = (low - furthest > samples.max(axis=0)) | (high + furthest < samples.min(axis=0))
     near = []
-    for other in elements:
+    for i in np.flatnonzero(~apart.any(axis=1)).tolist():
+        other = elements[i]
         if other is element:
             continue
-        other_radius = max(other.radius, other.radius_end)
         chainage, rho, _ = other.axis.pipe_coordinates(samples)
-        reach = 1.2 * (radius + other_radius) + step
+        reach = 1.2 * (radius + radii[i]) + step
         beside = (rho < reach) & (chainage > -reach) & (chainage < other.axis.length + reach)
         if beside.any():
             near.append(other)

@@ -2,9 +2,16 @@
 
 import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from queue import Empty, SimpleQueue
+from threading import Event
 
+from pipecore.errors import CancelledError
 from pipecore.progress import Progress
+
+HEARTBEAT = 0.15
+"""Progress is told at least this often, seconds, so that a cancel is soon heard."""
 
 _n_threads = os.cpu_count() or 1
 
@@ -46,14 +53,45 @@ def for_chunks(
         Which part of the stage's fraction these items are.
     """
     starts = range(0, n_items, chunk_size)
+
+    def chunk(k: int, _check: Callable[[], None]) -> None:
+        work(starts[k], min(starts[k] + chunk_size, n_items))
+
+    for_items(chunk, len(starts), stage, progress, span)
+
+
+def for_items(
+    work: Callable[[int, Callable[[], None]], None],
+    n_items: int,
+    stage: str,
+    progress: Progress,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> None:
+    """Call `work(item, check)` for each of `n_items`, in threads.
+
+    As `for_chunks`; `check` is to be called now and then by work that takes long: it
+    raises where the work is cancelled.
+    """
     begin, end = span
     progress.update(stage, begin)
+    is_over = Event()
+
+    def check() -> None:
+        if is_over.is_set():
+            raise CancelledError
+
+    ended: SimpleQueue[Future[None]] = SimpleQueue()
     with ThreadPoolExecutor(_n_threads) as pool:
-        futures = [pool.submit(work, s, min(s + chunk_size, n_items)) for s in starts]
+        for i in range(n_items):
+            pool.submit(work, i, check).add_done_callback(ended.put)
+        n_left = n_items
         try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                future.result()
-                progress.update(stage, begin + (end - begin) * done / len(starts))
+            while n_left > 0:
+                with suppress(Empty):
+                    ended.get(timeout=HEARTBEAT).result()
+                    n_left -= 1
+                progress.update(stage, begin + (end - begin) * (1.0 - n_left / n_items))
         except BaseException:
+            is_over.set()
             pool.shutdown(cancel_futures=True)
             raise
