@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from pipecore._kernels.sections import fit_sections
 from pipecore.ellipses import (
@@ -134,24 +135,26 @@ def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Prof
     """
     tables = []
     free = np.ones(len(ellipses), np.bool_)
+    tree = cKDTree(ellipses.centre) if len(ellipses) else None
+    slack = 2 * ellipses.radius_sd
+    most_slack = float(slack.max(initial=0.0))
     for element in elements:
         axis = element.axis
-        chainage, rho, _ = axis.pipe_coordinates(ellipses.centre)
+        near = _near_axis(tree, element, most_slack)
+        near = near[free[near]]
+        chainage, rho, _ = axis.pipe_coordinates(ellipses.centre[near])
         expected = element.radius_at(np.clip(chainage, 0.0, axis.length))
-        along = np.abs(np.einsum("ij,ij->i", axis.tangent(chainage), ellipses.axis))
-        slack = 2 * ellipses.radius_sd
+        along = np.abs(np.einsum("ij,ij->i", axis.tangent(chainage), ellipses.axis[near]))
         own = (
-            free
-            & (chainage >= 0)
+            (chainage >= 0)
             & (chainage <= axis.length)
-            & (rho < 0.25 * expected + slack)
-            & (np.abs(ellipses.radius - expected) < 0.25 * expected + slack)
+            & (rho < 0.25 * expected + slack[near])
+            & (np.abs(ellipses.radius[near] - expected) < 0.25 * expected + slack[near])
             & (along > np.cos(np.deg2rad(20.0)))
         )
-        free &= ~own
-        rows = np.flatnonzero(own)
+        rows, at, rho, expected = near[own], chainage[own], rho[own], expected[own]
+        free[rows] = False
         e = ellipses[rows]
-        at = chainage[rows]
         table = Profiles(
             element_id=np.full(len(rows), element.element_id, np.int32),
             stack_id=e.stack_id,
@@ -166,8 +169,8 @@ def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Prof
             radius=e.radius,
             radius_sd=e.radius_sd,
             ovality=np.full(len(rows), np.nan),
-            centre_deviation=rho[rows],
-            radius_deviation=e.radius - expected[rows],
+            centre_deviation=rho,
+            radius_deviation=e.radius - expected,
             arc=e.arc,
             n_points=e.n_points,
             rms=e.rms,
@@ -176,3 +179,15 @@ def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Prof
         )
         tables.append(table[np.lexsort((at, e.stack_id))])
     return Profiles.concatenate(tables)
+
+
+def _near_axis(tree: cKDTree | None, element: Element, slack: float) -> NDArray[np.intp]:
+    """Ellipses whose centres may be an element's, in order: in balls along its axis."""
+    if tree is None:
+        return np.empty(0, np.intp)
+    axis = element.axis
+    reach = 0.25 * max(element.radius, element.radius_end) + slack
+    n = int(np.ceil(axis.length / (2 * reach))) + 1
+    places = axis.at((np.arange(n) + 0.5) * axis.length / n)
+    balls = tree.query_ball_point(places, reach + 0.5 * axis.length / n + 1e-9)
+    return np.unique(np.concatenate([np.asarray(b, np.intp) for b in balls]))
