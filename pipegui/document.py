@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from pipecore.settings import Settings
+from pipecore.settings import LengthUnit, Settings
 from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
 
 
@@ -146,6 +146,9 @@ class Scan:
     result: Result | None = None
     reviews: Mapping[int, Review] = field(default_factory=dict)
     """By the ids of the deformations; those that nobody has looked at are not in it."""
+
+    length_unit: LengthUnit = LengthUnit.METRE
+    """In which the file was read."""
 
     def review(self, deformation_id: int) -> Review:
         """Return what a person said of a deformation, or that it is open."""

@@ -116,7 +116,7 @@ class Jobs(QObject):
                 cloud = self._read(path, settings, progress)
                 if not len(cloud):
                     raise ReadError(f"“{path.name}” holds no points.")
-                return Scan(path.name, cloud)
+                return Scan(path.name, cloud, length_unit=settings.input.length_unit)
 
             self._request(_Request(f"Reading {path.name}", work, self.scan_read.emit))
 

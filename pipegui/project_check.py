@@ -1,0 +1,63 @@
+"""Whether a result that was read is one that the rest of the program can rely on. Qt-free."""
+
+import numpy as np
+
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.types import NO_ID, OWN_STACK, Element, Result
+
+
+def check_result(result: Result) -> None:
+    """Raise `ValueError` if parts of a result do not go together."""
+    _check_ids("stacks", [s.stack_id for s in result.stacks])
+    ids = [e.element_id for e in result.elements]
+    _check_ids("elements", ids)
+    _check_ids("deformations", [d.deformation_id for d in result.deformations])
+    if not result.stacks and result.elements:
+        raise ValueError("there are elements without stacks")
+    for stack in result.stacks:
+        _check_vectors(stack.direction)
+        if not stack.width > 0:
+            raise ValueError("a stack has no width")
+    for element in result.elements:
+        _check_element(element)
+    _check_vectors(result.origin)
+    for deformation in result.deformations:
+        _check_vectors(deformation.peak)
+    own = {d.element_id for d in result.deformations} | set(result.profiles.element_id.tolist())
+    of_points = {int(result.element_id.min(initial=NO_ID)), int(result.element_id.max(initial=0))}
+    if not own <= set(ids) or not of_points <= {NO_ID, *ids}:
+        raise ValueError("something belongs to an element that is not there")
+    present = np.zeros(max([0, *ids]) + 1, np.bool_)
+    present[[NO_ID, *ids]] = True
+    if not present[result.element_id].all():
+        raise ValueError("points belong to an element that is not there")
+    stacks = {OWN_STACK, *(s.stack_id for s in result.stacks)}
+    if not set(result.profiles.stack_id.tolist()) <= stacks:
+        raise ValueError("profiles belong to a stack that is not there")
+    if int(result.segment_id.min(initial=0)) < 0:
+        raise ValueError("its segments are not numbered")
+
+
+def _check_ids(what: str, ids: list[int]) -> None:
+    if ids != sorted(set(ids)) or (ids and ids[0] <= NO_ID):
+        raise ValueError(f"its {what} are not in the order of their numbers")
+
+
+def _check_vectors(*vectors: np.ndarray) -> None:
+    for vector in vectors:
+        if vector.shape != (3,) or not np.isfinite(vector).all():
+            raise ValueError("a position is not one")
+
+
+def _check_element(element: Element) -> None:
+    axis = element.axis
+    match axis:
+        case LineAxis():
+            _check_vectors(axis.start, axis.direction)
+        case ArcAxis():
+            _check_vectors(axis.centre, axis.normal, axis.towards_start)
+    numbers = (axis.length, element.radius, element.radius_end)
+    if not all(np.isfinite(n) and n > 0 for n in numbers) or element.run_id <= NO_ID:
+        raise ValueError(f"the measures of element {element.element_id} are none")
+    if element.centre.shape != (3,):
+        raise ValueError("a position is not one")
