@@ -15,9 +15,9 @@ from pipecore.elements.sections import tabulate_ellipses
 from pipecore.ellipses import Ellipses, fit_ellipses
 from pipecore.measurement import measure_elements
 from pipecore.profiles import segment_profiles
-from pipecore.progress import NoProgress, Progress
+from pipecore.progress import NoProgress, Progress, Renamed
 from pipecore.rules import Rule, judge, load_rule
-from pipecore.segments import overlay_stacks
+from pipecore.segments import Overlay
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
 from pipecore.surface import sample_surface
@@ -27,9 +27,9 @@ STAGES = {
     "thinning": 0.08,
     "normals": 0.10,
     "directions": 0.04,
-    "profiles": 0.22,
+    "profiles": 0.28,
     "segments": 0.03,
-    "ellipses": 0.08,
+    "ellipses": 0.02,
     "axes": 0.03,
     "elements": 0.22,
     "deformations": 0.20,
@@ -70,20 +70,33 @@ def detect(
         surface = sample_surface(cloud, settings.thinning, progress)
     with _timed(seconds, "stacks"):
         stacks = choose_stacks(surface, settings.stacks, progress)
-    with _timed(seconds, "profiles"):
-        curves = [
-            segment_profiles(surface, stack, settings.profiles, max_radius, progress, span)
-            for stack, span in _shares(stacks)
-        ]
+    overlay, found = Overlay(len(surface.xyz)), []
+    for stack, (begin, end) in _shares(stacks):
+        # Stack by stack: the curves of all together need more memory than the cloud.
+        middle = begin + 0.85 * (end - begin)
+        with _timed(seconds, "profiles"):
+            curves = segment_profiles(
+                surface, stack, settings.profiles, max_radius, progress, (begin, middle)
+            )
+        with _timed(seconds, "segments"):
+            overlay.add(curves)
+        with _timed(seconds, "ellipses"):
+            found.append(
+                fit_ellipses(
+                    curves,
+                    surface,
+                    settings.ellipses,
+                    settings.elements,
+                    Renamed(progress, "profiles"),
+                    (middle, end),
+                )
+            )
     with _timed(seconds, "segments"):
-        segments = overlay_stacks(curves, len(surface.xyz), progress)
+        progress.update("segments", 0.0)
+        segments = overlay.number_segments()
     with _timed(seconds, "ellipses"):
-        ellipses = Ellipses.concatenate(
-            [
-                fit_ellipses(c, surface, settings.ellipses, settings.elements, progress, span)
-                for c, span in _shares(curves)
-            ]
-        )
+        progress.update("ellipses", 0.0)
+        ellipses = Ellipses.concatenate(found)
     with _timed(seconds, "axes"):
         chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):
@@ -160,4 +173,4 @@ def _shares(items: Sequence[Item]) -> Iterator[tuple[Item, tuple[float, float]]]
 def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
     start = time.perf_counter()
     yield
-    seconds[step] = time.perf_counter() - start
+    seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start

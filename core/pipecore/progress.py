@@ -23,6 +23,17 @@ class NoProgress:
         """Do nothing."""
 
 
+class Renamed:
+    """Tells another progress of work as part of one of its stages."""
+
+    def __init__(self, progress: Progress, stage: str) -> None:
+        self._progress, self._stage = progress, stage
+
+    def update(self, stage: str, fraction: float) -> None:
+        """Pass on how far the work is, whatever it calls itself."""
+        self._progress.update(self._stage, fraction)
+
+
 def in_chunks(
     n_items: int, chunk_size: int, stage: str, progress: Progress
 ) -> Iterator[tuple[int, int]]:

@@ -1,4 +1,4 @@
-"""Grouping items by a small integer label in one pass."""
+"""Grouping items by a small integer label, and sorting them by a large one, in few passes."""
 
 import numpy as np
 from numba import njit
@@ -18,3 +18,86 @@ def group_by_label(labels, n_labels):
         members[place[labels[i]]] = i
         place[labels[i]] += 1
     return members, starts
+
+
+@njit(cache=True, nogil=True)
+def group_from(labels, first, n_labels):
+    """Do as `group_by_label` for labels from `first` on, leaving out items of smaller ones."""
+    starts = np.zeros(n_labels + 1, np.int64)
+    for label in labels:
+        if label >= first:
+            starts[label - first + 1] += 1
+    for k in range(n_labels):
+        starts[k + 1] += starts[k]
+    place = starts[:-1].copy()
+    members = np.empty(starts[n_labels], np.int32)
+    for i in range(labels.shape[0]):
+        label = labels[i]
+        if label >= first:
+            members[place[label - first]] = i
+            place[label - first] += 1
+    return members, starts
+
+
+@njit(cache=True, nogil=True)
+def group_large(labels, n_labels, min_size):
+    """Members of the groups of at least `min_size` items in order, and where each starts."""
+    place = np.zeros(n_labels, np.int64)
+    for label in labels:
+        place[label] += 1
+    n_groups = n_members = 0
+    for k in range(n_labels):
+        if place[k] >= min_size:
+            n_groups += 1
+            n_members += place[k]
+    starts = np.empty(n_groups + 1, np.int64)
+    n_groups = n_members = 0
+    for k in range(n_labels):
+        size = place[k]
+        place[k] = -1
+        if size >= min_size:
+            starts[n_groups] = n_members
+            place[k] = n_members
+            n_groups += 1
+            n_members += size
+    starts[n_groups] = n_members
+    members = np.empty(n_members, np.int64)
+    for i in range(labels.shape[0]):
+        at = place[labels[i]]
+        if at >= 0:
+            members[at] = i
+            place[labels[i]] += 1
+    return members, starts
+
+
+DIGIT_BITS = 11
+
+
+@njit(cache=True, nogil=True)
+def argsort_keys(keys):
+    """Stable order of int64 keys, none negative, by a radix sort from the lowest digits up."""
+    n = keys.shape[0]
+    largest = np.int64(0)
+    for key in keys:
+        largest = max(largest, key)
+    order, other = np.arange(n), np.empty(n, np.int64)
+    n_digits = 1 << DIGIT_BITS
+    place = np.empty(n_digits, np.int64)
+    shift = 0
+    while largest >> shift > 0:
+        place[:] = 0
+        for key in keys:
+            place[(key >> shift) & (n_digits - 1)] += 1
+        total = 0
+        for digit in range(n_digits):
+            count = place[digit]
+            place[digit] = total
+            total += count
+        for k in range(n):
+            i = order[k]
+            digit = (keys[i] >> shift) & (n_digits - 1)
+            other[place[digit]] = i
+            place[digit] += 1
+        order, other = other, order
+        shift += DIGIT_BITS
+    return order

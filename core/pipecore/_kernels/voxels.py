@@ -14,48 +14,83 @@ EMPTY = np.int64(-1)
 
 
 @njit(cache=True, nogil=True)
-def voxel_keys(xyz, first, edge, n_y, n_z, keys):
-    """Write the number of the cube that each point lies in, counted from cube `first`."""
-    for i in range(xyz.shape[0]):
-        ix = np.int64(math.floor(xyz[i, 0] / edge)) - first[0]
-        iy = np.int64(math.floor(xyz[i, 1] / edge)) - first[1]
-        iz = np.int64(math.floor(xyz[i, 2] / edge)) - first[2]
-        keys[i] = (ix * n_y + iy) * n_z + iz
+def voxel_key(x, y, z, first, edge, n_y, n_z):
+    """Return the number of the cube that a point lies in, counted from cube `first`."""
+    ix = np.int64(math.floor(x / edge)) - first[0]
+    iy = np.int64(math.floor(y / edge)) - first[1]
+    iz = np.int64(math.floor(z / edge)) - first[2]
+    return (ix * n_y + iy) * n_z + iz
+
+
+@njit(cache=True, nogil=True)
+def hash_of(key):
+    """Return the well mixed bits of a key; the upper ones are the best."""
+    return np.uint64(key) * HASH_MULTIPLIER
 
 
 @njit(cache=True, nogil=True)
 def slot_of(key, table_keys, mask):
     """Slot of `key` in an open-addressing table, or the empty slot where it would go."""
-    slot = (np.uint64(key) * HASH_MULTIPLIER) >> np.uint64(20)
-    slot = np.int64(slot) & mask
+    slot = np.int64(hash_of(key) >> np.uint64(20)) & mask
     while table_keys[slot] != EMPTY and table_keys[slot] != key:
         slot = (slot + 1) & mask
     return slot
 
 
 @njit(cache=True, nogil=True)
-def number_voxels(keys, table_keys, table_ids, ids, first_id):
-    """Give each new key the next number; write each point's number. Return the count."""
+def number_voxels(
+    xyz, start, stop, first, edge, n_y, n_z, part, n_parts, table_keys, table_ids, n, keys, ids
+):
+    """Give each new cube of points start … stop the next number; write each point's number.
+
+    Only cubes whose hash falls to `part` of `n_parts` are looked at, so that parts may run
+    beside each other; what is written is `n_parts` times the number plus `part`. `keys`
+    takes the key of each number. Stops early where the table is half full; returns the
+    point to go on with and how many cubes are numbered, `n` before.
+    """
     mask = np.int64(table_keys.shape[0] - 1)
-    n = first_id
-    for i in range(keys.shape[0]):
-        slot = slot_of(keys[i], table_keys, mask)
+    room = min(table_keys.shape[0] // 2, keys.shape[0])
+    for i in range(start, stop):
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        if n_parts > 1 and np.int64(hash_of(key) >> np.uint64(52)) % n_parts != part:
+            continue
+        slot = slot_of(key, table_keys, mask)
         if table_keys[slot] == EMPTY:
-            table_keys[slot] = keys[i]
+            if n >= room:
+                return i, n
+            table_keys[slot] = key
             table_ids[slot] = n
+            keys[n] = key
             n += 1
-        ids[i] = table_ids[slot]
-    return n
+        ids[i] = table_ids[slot] * n_parts + part
+    return stop, n
 
 
 @njit(cache=True, nogil=True)
-def sum_voxels(xyz, ids, sums, counts):
-    """Add up the points of each voxel, in whole micrometres."""
+def rename_voxels(ids, start, stop, new_ids):
+    """Give points start … stop the new numbers of their cubes."""
+    for i in range(start, stop):
+        ids[i] = new_ids[ids[i]]
+
+
+@njit(cache=True, nogil=True)
+def sum_voxels(xyz, ids, first, last, sums, counts):
+    """Add up the points of the cubes first … last, in whole micrometres."""
     for i in range(xyz.shape[0]):
         k = ids[i]
+        if k < first or k >= last:
+            continue
         for j in range(3):
             sums[k, j] += np.int64(round(xyz[i, j] * 1e6))
         counts[k] += 1
+
+
+@njit(cache=True, nogil=True)
+def mean_voxels(sums, counts, start, stop, means):
+    """Write the means of cubes start … stop."""
+    for k in range(start, stop):
+        for j in range(3):
+            means[k, j] = sums[k, j] / (1e6 * counts[k])
 
 
 @njit(cache=True, nogil=True)

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import nearby as kernels
-from pipecore._kernels import voxels
 from pipecore._kernels.grouping import group_by_label
 from pipecore.elements.surfaces import SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.surface import Surface
-from pipecore.surface.grid import cell_numbers, empty_table
+from pipecore.surface.grid import GridFrame, VoxelCounter, table_of
 from pipecore.types import PointCloud
 
 Array = NDArray[np.float64]
@@ -47,29 +46,15 @@ class PointsOn:
     inside: tuple[Array, Array]
 
 
-def _numbered_cells(
+def _in_order_met(
     keys: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Ids of the cells of points, and the cells' numbers.
-
-    The table grows with the cells, which are far fewer than the points.
-    """
-    chunk = 1 << 17
-    known = np.empty(0, np.int64)
-    ids = np.empty(len(keys), np.int32)
-    table = empty_table(0)
-    for start in range(0, len(keys), chunk):
-        part = slice(start, start + chunk)
-        if 2 * (len(known) + chunk) > len(table[0]):
-            table = empty_table(2 * (len(known) + chunk))
-            voxels.fill_table(known, *table)
-        n_cells = voxels.number_voxels(keys[part], *table, ids[part], len(known))
-        is_new = ids[part] >= len(known)
-        longer = np.empty(n_cells, np.int64)
-        longer[: len(known)] = known
-        longer[ids[part][is_new]] = keys[part][is_new]
-        known = longer
-    return ids, known
+    """Ids of keys in the order in which they are met, and the key of each id."""
+    known, at, place = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(at)
+    ids = np.empty(len(known), np.int32)
+    ids[order] = np.arange(len(known), dtype=np.int32)
+    return ids[place], known[order]
 
 
 class NearbyPoints:
@@ -80,14 +65,17 @@ class NearbyPoints:
         self.surface = surface
         self._members, self._starts = group_by_label(surface.parent, len(surface.xyz))
         edge = CELL_VOXELS * surface.voxel
-        keys, first, n_y, n_z = cell_numbers(surface.xyz, edge)
-        cell, numbers = _numbered_cells(keys)
+        frame = GridFrame.of(surface.xyz, edge)
+        first, _, n_y, n_z = frame.numbers
+        counter = VoxelCounter(frame)
+        cell = np.empty(len(surface.xyz), np.int32)
+        counter.add(surface.xyz, 0, len(cell), cell)
+        numbers = counter.keys
         place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
         coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
         x, y, z = (place // COARSE).T
-        coarse, coarse_numbers = _numbered_cells((x * coarse_y + y) * coarse_z + z)
-        table = empty_table(len(coarse_numbers))
-        voxels.fill_table(coarse_numbers, *table)
+        coarse, coarse_numbers = _in_order_met((x * coarse_y + y) * coarse_z + z)
+        table = table_of(coarse_numbers)
         order, cell_starts = group_by_label(coarse, len(coarse_numbers))
         middles = (first + place[order] + 0.5) * edge
         self._grid = (

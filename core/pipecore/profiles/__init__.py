@@ -1,5 +1,6 @@
 """Profile segmentation: the points of each profile joined to curves (paper, section 3.2)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import ellipses as ellipse_kernels
 from pipecore._kernels import profiles as kernels
+from pipecore._kernels.grouping import group_from, group_large
 from pipecore.geometry import unit
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
@@ -28,6 +30,15 @@ MIN_CURVE = 6
 
 MAX_PIECES = 40
 """Most pieces that one curve is split into."""
+
+MAX_GAPS = 4.0
+"""The largest gap where points are sparsest, in those where they are dense."""
+
+MARGIN = 12
+"""Empty cells between the rows of a profile: more than twice the cells of the largest gap."""
+
+POINTS_AT_A_TIME = 40_000
+"""Points of the profiles that one thread cuts at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +63,7 @@ class Curves:
 
     stack: Stack
     frame: NDArray[np.float64]
-    points: NDArray[np.intp]
+    points: NDArray[np.int32]
     uv: NDArray[np.float64]
     normals: NDArray[np.float64]
     starts: NDArray[np.int64]
@@ -107,93 +118,130 @@ def segment_profiles(
     """
     begin, end = span
     progress.update("profiles", begin)
-    frame = stack_frame(stack.direction)
-    n = len(surface.xyz)
-    usable, profile = np.empty(n, np.bool_), np.zeros(n, np.int64)
-    uv, normals = np.empty((n, 2)), np.empty((n, 3))
-    kernels.carry_to_mid_planes(
-        surface.xyz, surface.normals, usable, frame[2], frame[0], frame[1],
-        stack.width, stack.offset, MAX_SLOPE, profile, uv, normals,
-    )  # fmt: skip
-    if stack.min_spacing:
-        usable &= surface.spacing >= stack.min_spacing
-    points = np.flatnonzero(usable)
-    profile, uv, normals = profile[points], uv[points], normals[points]
-    if len(points) == 0:
+    middle = begin + 0.1 * (end - begin)
+    cutter = _Cutter(surface, stack, settings, max_radius, progress, (begin, middle))
+    bounds = cutter.bounds()
+    parts: list[Curves | None] = [None] * (len(bounds) - 1)
+
+    def cut(first: int, last: int) -> None:
+        for k in range(first, last):
+            parts[k] = cutter.cut(bounds[k], bounds[k + 1])
+
+    for_chunks(cut, len(parts), 1, "profiles", progress, (middle, end))
+    return _concatenated(stack, cutter.frame, parts)
+
+
+class _Cutter:
+    """Cuts profiles of one stack and joins their points to curves."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        stack: Stack,
+        settings: ProfileSettings,
+        max_radius: float,
+        progress: Progress,
+        span: tuple[float, float],
+    ) -> None:
+        self.frame = stack_frame(stack.direction)
+        self._surface, self._stack, self._max_radius = surface, stack, max_radius
+        self._gap = settings.gap_mm / 1e3 or GAP * surface.voxel
+        self._is_gap_fixed = bool(settings.gap_mm)
+        self._is_fitted = settings.method is ProfileMethod.CURVE_FITTING
+        self._cos_corner = np.cos(np.deg2rad(settings.corner_deg)) if self._is_fitted else -1.0
+        n = len(surface.xyz)
+        profile: NDArray[np.integer] = np.empty(n, np.int32)
+        limits = np.empty((-(-n // POINTS_AT_A_TIME), 2), np.int64)
+
+        def find(start: int, stop: int) -> None:
+            limits[start // POINTS_AT_A_TIME] = kernels.find_profiles(
+                surface.xyz, surface.normals, surface.spacing, start, stop,
+                self.frame[2], stack.width, stack.offset, MAX_SLOPE, stack.min_spacing, profile,
+            )  # fmt: skip
+
+        for_chunks(find, n, POINTS_AT_A_TIME, "profiles", progress, span)
+        first = limits[:, 0].min(initial=2**31)
+        last = limits[:, 1].max(initial=-(2**31))
+        if last - first > 2 * n:
+            # Something lies far off: only the profiles that hold points are counted.
+            held, profile = np.unique(profile, return_inverse=True)
+            first, last = int(held[0] == kernels.NOT_CUT), len(held) - 1
+        self._points, self._starts = group_from(profile, first, max(0, last - first + 1))
+
+    def bounds(self) -> NDArray[np.intp]:
+        """Points between which whole profiles lie, in portions of about the same size."""
+        n = len(self._points)
+        even = np.linspace(0, n, 1 + max(1, n // POINTS_AT_A_TIME))
+        return np.unique(self._starts[np.searchsorted(self._starts, even)])
+
+    def cut(self, start: int, stop: int) -> Curves:
+        """Return the curves of the points start … stop."""
+        surface = self._surface
+        points = self._points[start:stop]
+        n = len(points)
+        profile, uv, normals = np.empty(n, np.int32), np.empty((n, 2)), np.empty((n, 3))
+        kernels.carry_to_mid_planes(
+            surface.xyz, surface.normals, points, self.frame[2], self.frame[0], self.frame[1],
+            self._stack.width, self._stack.offset, profile, uv, normals,
+        )  # fmt: skip
+        order, keys, n_v = kernels.sort_by_cell(profile, uv, self._gap, MARGIN)
+        points, profile, uv, normals = points[order], profile[order], uv[order], normals[order]
+        reach = np.full(n, self._gap)
+        if not self._is_gap_fixed:
+            spacing = surface.spacing[points]
+            reach = np.clip(GAP_IN_SPACINGS * spacing, self._gap, MAX_GAPS * self._gap)
+        parents = np.arange(n)
+        kernels.join_neighbours(
+            keys, n_v, self._gap, uv, normals, reach, self._cos_corner, surface.tolerance, 0.12,
+            0, n, parents,
+        )  # fmt: skip
+        curves = self._grouped(points, uv, normals, profile, parents, n)
+        if not self._is_fitted or len(curves) == 0:
+            return curves
+        piece = np.zeros(len(curves.points), np.int64)
+        ellipse_kernels.split_curves(
+            curves.uv, curves.normals, curves.starts, 0, len(curves), MIN_CURVE,
+            surface.tolerance, 0.9, np.cos(np.pi / 4), self._max_radius, 60, MAX_PIECES, piece,
+        )  # fmt: skip
+        profile = np.repeat(curves.profile_index, np.diff(curves.starts))
+        label = curves.curve_of_point * (MAX_PIECES + 1) + piece
+        n_labels = len(curves) * (MAX_PIECES + 1)
+        return self._grouped(curves.points, curves.uv, curves.normals, profile, label, n_labels)
+
+    def _grouped(
+        self,
+        points: NDArray[np.integer],
+        uv: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        profile: NDArray[np.int32],
+        label: NDArray[np.int64],
+        n_labels: int,
+    ) -> Curves:
+        """Group points by label; labels lie within profiles. Small groups are dropped."""
+        members, starts = group_large(label, n_labels, MIN_CURVE)
         return Curves(
-            stack, frame, points, uv, normals, np.zeros(1, np.int64), np.empty(0, np.int32)
+            self._stack,
+            self.frame,
+            points[members],
+            uv[members],
+            normals[members],
+            starts,
+            profile[members[starts[:-1]]],
         )
 
-    is_fitted = settings.method is ProfileMethod.CURVE_FITTING
-    gap = settings.gap_mm / 1e3 or GAP * surface.voxel
-    reach = np.full(len(points), gap)
-    if not settings.gap_mm:
-        reach = np.clip(GAP_IN_SPACINGS * surface.spacing[points], gap, 4 * gap)
-    tolerance = surface.tolerance
 
-    # Sort by profile and by cell within it, row by row, with empty margins between.
-    # Cells count from the local zero: a part of the cloud is sorted as the whole is.
-    cell_uv = np.floor(uv / gap).astype(np.int64)
-    cell_uv -= cell_uv.min(axis=0)
-    n_u, n_v = cell_uv.max(axis=0) + 12
-    keys = ((profile - profile.min()) * n_u + cell_uv[:, 0]) * n_v + cell_uv[:, 1]
-    order = np.argsort(keys, kind="stable")
-    keys, points, profile = keys[order], points[order], profile[order]
-    uv, normals, reach = uv[order], normals[order], reach[order]
-    parents = np.arange(len(points))
-    bounds = np.append(np.flatnonzero(np.diff(profile, prepend=profile[0] - 1)), len(points))
-
-    def join(first: int, last: int) -> None:
-        kernels.join_neighbours(
-            keys, n_v, gap, uv, normals, reach,
-            np.cos(np.deg2rad(settings.corner_deg)) if is_fitted else -1.0,
-            tolerance, 0.12, bounds[first], bounds[last], parents,
-        )  # fmt: skip
-
-    middle = begin + 0.5 * (end - begin)
-    for_chunks(join, len(bounds) - 1, 32, "profiles", progress, (begin, middle))
-    curves = _group(stack, frame, points, uv, normals, profile, parents)
-    if not is_fitted or len(curves) == 0:
-        progress.update("profiles", end)
-        return curves
-
-    piece = np.zeros(len(curves.points), np.int64)
-
-    def split(first: int, last: int) -> None:
-        ellipse_kernels.split_curves(
-            curves.uv, curves.normals, curves.starts, first, last, MIN_CURVE, tolerance,
-            0.9, np.cos(np.pi / 4), max_radius, 60, MAX_PIECES, piece,
-        )  # fmt: skip
-
-    for_chunks(split, len(curves), 256, "profiles", progress, (middle, end))
-    return _group(
-        stack, frame, curves.points, curves.uv, curves.normals,
-        np.repeat(curves.profile_index, np.diff(curves.starts)),
-        curves.curve_of_point * (MAX_PIECES + 1) + piece,
-    )  # fmt: skip
-
-
-def _group(
-    stack: Stack,
-    frame: NDArray[np.float64],
-    points: NDArray[np.intp],
-    uv: NDArray[np.float64],
-    normals: NDArray[np.float64],
-    profile: NDArray[np.integer],
-    label: NDArray[np.integer],
+def _concatenated(
+    stack: Stack, frame: NDArray[np.float64], parts: Sequence[Curves | None]
 ) -> Curves:
-    """Group points by label; labels lie within profiles. Small groups are dropped."""
-    _, number, counts = np.unique(label, return_inverse=True, return_counts=True)
-    kept = counts[number] >= MIN_CURVE
-    order = np.flatnonzero(kept)[np.argsort(number[kept], kind="stable")]
-    sizes = counts[counts >= MIN_CURVE]
-    starts = np.concatenate([[0], np.cumsum(sizes)])
+    """One table of the curves of all parts."""
+    curves = [c for c in parts if c is not None]
+    sizes = [np.diff(c.starts) for c in curves]
     return Curves(
         stack,
         frame,
-        points[order],
-        uv[order],
-        normals[order],
-        starts,
-        profile[order[starts[:-1]]].astype(np.int32),
+        np.concatenate([np.empty(0, np.int32), *(c.points for c in curves)]),
+        np.concatenate([np.empty((0, 2)), *(c.uv for c in curves)]),
+        np.concatenate([np.empty((0, 3)), *(c.normals for c in curves)]),
+        np.cumsum(np.concatenate([np.zeros(1, np.int64), *sizes])),
+        np.concatenate([np.empty(0, np.int32), *(c.profile_index for c in curves)]),
     )

@@ -14,6 +14,30 @@ MIN_SEGMENT = 20
 """Components of fewer thinned points are no segments."""
 
 
+class Overlay:
+    """Stacks laid over each other: points that share a curve in any stack are one component.
+
+    Stacks are added one by one, so that no two need be held at a time.
+    """
+
+    def __init__(self, n_points: int) -> None:
+        self._parents = np.arange(n_points, dtype=np.int32)
+
+    def add(self, curves: Curves) -> None:
+        """Join the points that share a curve of this stack."""
+        components.unite_groups(curves.points, curves.starts, self._parents)
+
+    def number_segments(self) -> NDArray[np.int32]:
+        """Return the segment of each point, 1 for the largest; `NO_ID` for points of none."""
+        components.flatten(self._parents)
+        sizes = np.bincount(self._parents)
+        roots = np.flatnonzero(sizes >= MIN_SEGMENT)
+        roots = roots[np.lexsort((roots, -sizes[roots]))]
+        number = np.full(len(sizes), NO_ID, np.int32)
+        number[roots] = np.arange(1, len(roots) + 1)
+        return number[self._parents]
+
+
 def overlay_stacks(
     curves: Sequence[Curves], n_points: int, progress: Progress
 ) -> NDArray[np.int32]:
@@ -30,17 +54,11 @@ def overlay_stacks(
     Returns
     -------
     ndarray of int32, shape (n_points,)
-        The segment of each point, 1 for the largest; `NO_ID` for points of none.
+        As `Overlay.number_segments`.
     """
-    parents = np.arange(n_points)
+    overlay = Overlay(n_points)
     for i, stack_curves in enumerate(curves):
         progress.update("segments", i / len(curves))
-        components.unite_groups(stack_curves.points, stack_curves.starts, parents)
-    components.flatten(parents)
-    roots, component, sizes = np.unique(parents, return_inverse=True, return_counts=True)
-    by_size = np.lexsort((roots, -sizes))
-    number = np.empty(len(roots), np.int32)
-    number[by_size] = np.arange(1, len(roots) + 1)
-    number[sizes < MIN_SEGMENT] = NO_ID
+        overlay.add(stack_curves)
     progress.update("segments", 1.0)
-    return number[component]
+    return overlay.number_segments()

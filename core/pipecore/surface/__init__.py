@@ -10,7 +10,8 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import CellGrid
-from pipecore.surface.thinning import ThinnedCloud, median_spacing, thin
+from pipecore.surface.spacing import median_spacing
+from pipecore.surface.thinning import ThinnedCloud, thin
 from pipecore.types import PointCloud
 
 __all__ = [
@@ -87,13 +88,12 @@ def fit_planes(
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_planes(
-            xyz, *grid.lookup, radius, MIN_NEIGHBOURS, start, stop, normals, residuals, spacing
-        )
+            xyz, *grid.lookup, radius, MIN_NEIGHBOURS, start, stop, grid.order,
+            normals, residuals, spacing,
+        )  # fmt: skip
 
-    for_chunks(work, n, 50_000, "normals", progress)
-    back = np.empty(n, np.intp)
-    back[grid.order] = np.arange(n)
-    return normals[back], residuals[back], spacing[back]
+    for_chunks(work, len(grid.cell_keys), 8_000, "normals", progress)
+    return normals, residuals, spacing
 
 
 def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:

@@ -4,17 +4,21 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
+from pipecore import parallel
 from pipecore._kernels import voxels
-from pipecore.progress import NoProgress, Progress, in_chunks
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
-from pipecore.surface.grid import cell_numbers, empty_table
+from pipecore.surface.grid import GridFrame, VoxelCounter
+from pipecore.surface.spacing import median_spacing
 from pipecore.types import PointCloud
 
 SMALLEST_VOXEL = 0.003
 """Thinning finer than 3 mm keeps noise, not shape."""
-_HASH_FACTORS = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)
+CHUNK = 2_000_000
+MAX_PARTS = 8
+"""Most threads that number voxels: each looks at all points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,36 +40,6 @@ class ThinnedCloud:
     voxel: float
 
 
-def median_spacing(
-    xyz: NDArray[np.floating],
-    n_sample: int = 4000,
-    n_neighbours: int = 8,
-    among: NDArray[np.bool_] | None = None,
-) -> float:
-    """Typical distance between neighbouring points on the scanned surfaces, metres.
-
-    From the radius of the disc that holds `n_neighbours` points around sampled points:
-    close pairs of overlapping scans do not make it smaller than it is. `among` says around
-    which points, where others lack neighbours.
-    """
-    if len(xyz) < 2:
-        return 0.0
-    tree = cKDTree(xyz)
-    places = xyz if among is None or not among.any() else xyz[among]
-    sample = places[_sample_by_place(places, min(n_sample, len(places)))]
-    n_neighbours = min(n_neighbours, len(xyz) - 1)
-    reach, _ = tree.query(sample, n_neighbours + 1)
-    return float(np.median(reach[:, -1]) * np.sqrt(np.pi / (n_neighbours + 1)))
-
-
-def _sample_by_place(xyz: NDArray[np.floating], n_sample: int) -> NDArray[np.intp]:
-    """Positions of points drawn by a hash of their coordinates, so in any order the same."""
-    bits = np.ascontiguousarray(xyz, np.float64).view(np.uint64)
-    mixed = bits @ np.array(_HASH_FACTORS, np.uint64)
-    mixed = (mixed ^ (mixed >> np.uint64(31))) * np.uint64(_HASH_FACTORS[0])
-    return np.argpartition(mixed, n_sample - 1)[:n_sample]
-
-
 def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> ThinnedCloud:
     """Average the points of `cloud` in voxels.
 
@@ -73,7 +47,9 @@ def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> T
     automatic. The result does not depend on the order of the points.
     """
     progress.update("thinning", 0.0)
-    edge = settings.voxel_mm / 1e3 or max(median_spacing(cloud.xyz), SMALLEST_VOXEL)
+    edge = settings.voxel_mm / 1e3 or max(
+        median_spacing(cloud.xyz, progress=progress), SMALLEST_VOXEL
+    )
     return average_voxels(cloud.xyz, edge, progress)
 
 
@@ -84,20 +60,50 @@ def average_voxels(
 
     All points of some voxels give the same means as they do among those of other voxels.
     """
-    keys, _, _, _ = cell_numbers(xyz, edge)
-    parent = np.empty(len(xyz), np.int32)
-    table_keys, table_ids = empty_table(len(xyz))
-    n_voxels = 0
-    for start, stop in in_chunks(len(xyz), 2_000_000, "thinning", progress):
-        n_voxels = voxels.number_voxels(
-            keys[start:stop], table_keys, table_ids, parent[start:stop], n_voxels
-        )
-    # In the order of the voxels, not in that of the points.
-    key_of_voxel = np.empty(n_voxels, np.int64)
-    key_of_voxel[parent] = keys
-    rank = np.empty(n_voxels, np.int32)
-    rank[np.argsort(key_of_voxel)] = np.arange(n_voxels, dtype=np.int32)
-    parent = rank[parent]
+    frame = GridFrame.of(xyz, edge)
+    parent, n_voxels = _number_voxels(xyz, frame, progress)
+
+    # Each thread sums the voxels of one stretch.
     sums, counts = np.zeros((n_voxels, 3), np.int64), np.zeros(n_voxels, np.int64)
-    voxels.sum_voxels(xyz, parent, sums, counts)
-    return ThinnedCloud(sums / (1e6 * counts[:, None]), parent, edge)
+    stretch = -(-n_voxels // min(parallel.threads(), MAX_PARTS))
+
+    def add(first: int, last: int) -> None:
+        voxels.sum_voxels(xyz, parent, first, last, sums, counts)
+
+    for_chunks(add, n_voxels, stretch, "thinning", progress, (0.7, 0.9))
+    means = np.empty((n_voxels, 3))
+
+    def average(first: int, last: int) -> None:
+        voxels.mean_voxels(sums, counts, first, last, means)
+
+    for_chunks(average, n_voxels, CHUNK, "thinning", progress, (0.9, 1.0))
+    return ThinnedCloud(means, parent, edge)
+
+
+def _number_voxels(
+    xyz: NDArray[np.floating], frame: GridFrame, progress: Progress
+) -> tuple[NDArray[np.int32], int]:
+    """Number of each point's voxel, in the order of the voxels, and how many there are."""
+    ids = np.empty(len(xyz), np.int32)
+    # Each thread takes the voxels of one part, whichever points are in them.
+    n_parts = min(parallel.threads(), MAX_PARTS)
+    counters = [VoxelCounter(frame, part, n_parts) for part in range(n_parts)]
+    for start in range(0, len(xyz), CHUNK):
+        stop = min(start + CHUNK, len(xyz))
+
+        def count(part: int, _: int, start: int = start, stop: int = stop) -> None:
+            counters[part].add(xyz, start, stop, ids)
+
+        span = (0.1 + 0.4 * start / len(xyz), 0.1 + 0.4 * stop / len(xyz))
+        for_chunks(count, n_parts, 1, "thinning", progress, span)
+    keys = np.concatenate([c.keys for c in counters])
+    at = np.concatenate([np.arange(c.n_cells) * n_parts + c.part for c in counters])
+    rank = np.empty(max(c.n_cells for c in counters) * n_parts, np.int32)
+    counters.clear()  # Their tables are large.
+    rank[at[np.argsort(keys)]] = np.arange(len(keys), dtype=np.int32)
+
+    def rename(start: int, stop: int) -> None:
+        voxels.rename_voxels(ids, start, stop, rank)
+
+    for_chunks(rename, len(ids), CHUNK, "thinning", progress, (0.6, 0.7))
+    return ids, len(keys)

@@ -37,16 +37,32 @@ def test_that_points_are_carried_within_their_tangent_plane_to_the_mid_plane(rng
     normals = unit_rows(rng.normal(size=(60, 3)))
     normals[7] = np.nan
     width, offset, max_slope = 0.4, 0.13, 0.62
-    usable, profile = np.empty(60, np.bool_), np.zeros(60, np.int64)
-    uv, mapped = np.empty((60, 2)), np.empty((60, 3))
-    profiles.carry_to_mid_planes(
-        xyz, normals, usable, frame[2], frame[0], frame[1], width, offset, max_slope,
-        profile, uv, mapped,
-    )  # fmt: skip
+    spacing = rng.uniform(0.0, 1.0, 60)
+    index = np.empty(60, np.int32)
+    limits = [
+        profiles.find_profiles(
+            xyz, normals, spacing, a, b, frame[2], width, offset, max_slope, 0.2, index
+        )
+        for a, b in ((0, 25), (25, 60))
+    ]
     slope = np.abs(normals @ frame[2])
-    assert list(usable) == [bool(s < max_slope) for s in slope]
+    usable = index != profiles.NOT_CUT
+    assert list(usable) == [
+        bool(s < max_slope and d >= 0.2) for s, d in zip(slope, spacing, strict=True)
+    ]
     assert 10 < usable.sum() < 59
-    for i in np.flatnonzero(usable):
+    assert min(low for low, _ in limits) == index[usable].min()
+    assert max(high for _, high in limits) == index[usable].max()
+    points = np.flatnonzero(usable)[::-1]
+    profile = np.zeros(60, np.int32)
+    uv, mapped = np.empty((60, 2)), np.empty((60, 3))
+    places, at, turned = (a[: len(points)].copy() for a in (profile, uv, mapped))
+    profiles.carry_to_mid_planes(
+        xyz, normals, points, frame[2], frame[0], frame[1], width, offset, places, at, turned
+    )
+    profile[points], uv[points], mapped[points] = places, at, turned
+    assert list(profile[usable]) == list(index[usable])
+    for i in points:
         along = xyz[i] @ frame[2]
         assert profile[i] == math.floor((along - offset) / width)
         middle = offset + (profile[i] + 0.5) * width
@@ -123,3 +139,18 @@ def test_that_groups_with_a_common_point_become_one(rng):
     label = connected(n, lambda i, j: any({i, j} <= s for s in sets))
     assert partition(parents) == partition(label)
     assert all(parents[i] == min(np.flatnonzero(parents == parents[i])) for i in range(n))
+
+
+def test_that_points_are_sorted_by_profile_and_cell(rng):
+    n, cell = 80, 0.25
+    profile = np.sort(rng.integers(-3, 2, n)).astype(np.int32)
+    uv = rng.uniform(-1, 1, (n, 2)) * [1.0, 0.5]
+    order, keys, n_v = profiles.sort_by_cell(profile, uv, cell, 12)
+    cells = np.floor(uv / cell).astype(int)
+    expected = np.lexsort((cells[:, 1], cells[:, 0], profile))
+    assert list(order) == list(expected)
+    # Cells within the margin of each other differ in their keys as they differ in place.
+    same = profile[order][1:] == profile[order][:-1]
+    step = np.diff(cells[order], axis=0)
+    assert_allclose(np.diff(keys)[same], (step[:, 0] * n_v + step[:, 1])[same])
+    assert n_v >= np.ptp(cells[:, 1]) + 12

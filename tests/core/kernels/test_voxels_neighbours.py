@@ -4,11 +4,12 @@ from collections import defaultdict
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial import cKDTree
 
-from pipecore._kernels import neighbours, voxels
-from pipecore._kernels.grouping import group_by_label
-from pipecore.surface.grid import CellGrid, cell_numbers, empty_table
+from pipecore._kernels import neighbours, spacing, voxels
+from pipecore._kernels.grouping import argsort_keys, group_by_label, group_from, group_large
+from pipecore.surface.grid import CellGrid, GridFrame, VoxelCounter, empty_table, table_of
 from tests.core.shapes import unit_rows
 
 # Hashing and random numbers wrap around on purpose, which plain numpy warns of.
@@ -25,23 +26,57 @@ def cells_of(xyz, edge):
 
 def test_that_points_share_a_number_as_they_share_a_cube(rng):
     xyz, edge = rng.normal(size=(150, 3)), 0.7
-    keys, *_ = cell_numbers(xyz, edge)
+    frame = GridFrame.of(xyz, edge)
     ids = np.empty(len(xyz), np.int32)
     # A crowded table makes keys collide.
     table_keys, table_ids = np.full(256, voxels.EMPTY), np.empty(256, np.int32)
-    n = voxels.number_voxels(keys[:70], table_keys, table_ids, ids[:70], 0)
-    n = voxels.number_voxels(keys[70:], table_keys, table_ids, ids[70:], n)
+    keys = np.empty(200, np.int64)
+    n = 0
+    for start, stop in ((0, 70), (70, 150)):
+        reached, n = voxels.number_voxels(
+            xyz, start, stop, *frame.numbers, 0, 1, table_keys, table_ids, n, keys, ids
+        )
+        assert reached == stop
     cells = cells_of(xyz, edge)
+    assert_array_equal(keys[ids], frame.keys(xyz))
     assert n == len(cells)
     assert {tuple(np.flatnonzero(ids == k)) for k in range(n)} == set(map(tuple, cells.values()))
 
     sums, counts = np.zeros((n, 3), np.int64), np.zeros(n, np.int64)
-    voxels.sum_voxels(xyz, ids, sums, counts)
+    for first, last in ((0, 20), (20, n)):
+        voxels.sum_voxels(xyz, ids, first, last, sums, counts)
+    means = np.empty((n, 3))
+    voxels.mean_voxels(sums, counts, 0, n, means)
     for members in cells.values():
         k = ids[members[0]]
         assert counts[k] == len(members)
-        mean = sums[k] / (1e6 * counts[k])
-        assert_allclose(mean, xyz[members].mean(axis=0), atol=0.6e-6)
+        assert_allclose(means[k], xyz[members].mean(axis=0), atol=0.6e-6)
+
+
+def test_that_a_full_table_tells_where_to_go_on(rng):
+    xyz, edge = rng.normal(size=(50, 3)), 0.1
+    frame = GridFrame.of(xyz, edge)
+    ids, keys = np.empty(50, np.int32), np.empty(50, np.int64)
+    table = empty_table(8)
+    reached, n = voxels.number_voxels(xyz, 0, 50, *frame.numbers, 0, 1, *table, 0, keys, ids)
+    assert n == len(table[0]) // 2
+    assert len(cells_of(xyz[:reached], edge)) == n
+    assert len(cells_of(xyz[: reached + 1], edge)) == n + 1
+
+
+@pytest.mark.parametrize("n_parts", [1, 3])
+def test_that_counters_that_share_the_points_number_every_cube_once(rng, n_parts):
+    xyz, edge = rng.normal(size=(400, 3)), 0.5
+    frame = GridFrame.of(xyz, edge)
+    counters = [VoxelCounter(frame, part, n_parts, room=4) for part in range(n_parts)]
+    ids = np.full(400, -1, np.int32)
+    for start, stop in ((0, 150), (150, 400)):
+        for counter in counters:
+            counter.add(xyz, start, stop, ids)
+    cells = cells_of(xyz, edge)
+    assert sum(c.n_cells for c in counters) == len(cells)
+    for i, key in enumerate(frame.keys(xyz)):
+        assert counters[ids[i] % n_parts].keys[ids[i] // n_parts] == key
 
 
 def test_that_a_key_is_found_where_it_was_put_and_an_absent_one_nowhere(rng):
@@ -60,8 +95,9 @@ def test_that_a_key_is_found_where_it_was_put_and_an_absent_one_nowhere(rng):
 def test_that_the_sorted_grid_holds_every_point_in_its_cell(rng):
     xyz, edge = rng.normal(size=(80, 3)), 0.5
     grid = CellGrid.build(xyz, edge)
-    first = np.floor(xyz.min(axis=0) / edge) - 4
-    assert_allclose(grid.cells, np.floor(xyz[grid.order] / edge) - first)
+    keys = GridFrame.of(xyz, edge).keys(xyz[grid.order])
+    assert (np.diff(keys) >= 0).all()
+    assert_array_equal(np.repeat(grid.cell_keys, np.diff(grid.cell_starts)), keys)
     assert sorted(grid.order) == list(range(80))
     found = {
         tuple(sorted(grid.order[a:b]))
@@ -80,9 +116,9 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
     sorted_xyz = xyz[grid.order]
     n = len(xyz)
     normals, residuals, spacings = np.empty((n, 3)), np.empty(n), np.empty(n)
-    for start, stop in ((0, 40), (40, n)):
+    for start, stop in ((0, 7), (7, len(grid.cell_keys))):
         neighbours.fit_planes(
-            sorted_xyz, *grid.lookup, radius, least_neighbours, start, stop,
+            sorted_xyz, *grid.lookup, radius, least_neighbours, start, stop, np.arange(n),
             normals, residuals, spacings,
         )  # fmt: skip
     reaches = []
@@ -133,3 +169,57 @@ def test_that_grouping_lists_the_items_of_each_label_in_order(rng):
         assert list(members[starts[k] : starts[k + 1]]) == [
             i for i, label in enumerate(labels) if label == k
         ]
+
+
+def test_that_grouping_from_a_label_on_leaves_out_the_smaller_ones(rng):
+    labels = rng.choice([-9, -2, 0, 3], size=50).astype(np.int32)
+    members, starts = group_from(labels, -2, 6)
+    for k in range(6):
+        assert list(members[starts[k] : starts[k + 1]]) == list(np.flatnonzero(labels == k - 2))
+
+
+def test_that_only_large_groups_are_kept_in_order_of_their_label(rng):
+    labels = rng.permutation(np.repeat([5, 1, 4, 0], [6, 2, 9, 3]))
+    members, starts = group_large(labels, 7, 3)
+    groups = [list(part) for part in np.split(members, starts[1:-1])]
+    assert groups == [list(np.flatnonzero(labels == k)) for k in (0, 4, 5)]
+    assert len(group_large(labels, 7, 20)[0]) == 0
+
+
+@pytest.mark.parametrize("largest", [1, 700, 2**40])
+def test_that_the_radix_sort_is_stable(rng, largest):
+    keys = rng.integers(0, largest, size=120)
+    keys[::3] = keys[0]
+    assert_array_equal(argsort_keys(keys), np.argsort(keys, kind="stable"))
+
+
+def test_that_a_hash_of_places_is_that_of_the_coordinates_bits(rng):
+    xyz = rng.normal(size=(20, 3)).astype(np.float32)
+    hashes = np.empty(12, np.uint64)
+    spacing.hash_places(xyz, 5, 17, hashes)
+    factors = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)
+    for row, p in zip(hashes, xyz[5:17].astype(np.float64), strict=True):
+        bits = map(int, p.view(np.uint64))
+        mixed = sum(b * f for b, f in zip(bits, factors, strict=True)) % 2**64
+        assert row == (mixed ^ (mixed >> 31)) * factors[0] % 2**64
+
+
+def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):
+    xyz, edge, k = rng.uniform(0, 1, (90, 3)), 0.2, 4
+    sample = xyz[::6].copy()
+    frame = GridFrame.of(xyz, edge)
+    steps = np.stack(np.meshgrid(*[[-1, 0, 1]] * 3), axis=-1).reshape(-1, 3)
+    around = (steps[:, 0] * frame.n_y + steps[:, 1]) * frame.n_z + steps[:, 2]
+    marked = np.unique(frame.keys(sample)[:, None] + around)
+    table = table_of(marked)
+    found, cells = np.empty(90, np.int64), np.empty(90, np.int32)
+    n = spacing.collect_marked(xyz, 0, 90, *frame.numbers, *table, found, cells)
+    assert {*found[:n]} == {*np.flatnonzero(np.isin(frame.keys(xyz), marked))}
+    order, starts = group_by_label(cells[:n], len(marked))
+    reach = np.empty(len(sample))
+    spacing.nearest_in_cells(
+        xyz, sample, *frame.numbers, *table, found[:n][order], starts, k, reach
+    )
+    true = cKDTree(xyz).query(sample, k)[0][:, -1]
+    assert_allclose(reach, np.where(true <= edge, true, np.nan))
+    assert np.isfinite(reach).sum() > 0

@@ -1,0 +1,72 @@
+"""Distances to the nearest neighbours of a few sampled points among very many."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.voxels import EMPTY, HASH_MULTIPLIER, slot_of, voxel_key
+
+_FACTORS = (HASH_MULTIPLIER, np.uint64(0xC2B2AE3D27D4EB4F), np.uint64(0x165667B19E3779F9))
+_FACTOR_X, _FACTOR_Y, _FACTOR_Z = _FACTORS
+
+
+@njit(cache=True, nogil=True)
+def hash_places(xyz, start, stop, hashes):
+    """Write a hash of the coordinates of each of the points start … stop."""
+    place = np.empty(3, np.float64)
+    bits = place.view(np.uint64)
+    for i in range(start, stop):
+        place[0], place[1], place[2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        mixed = bits[0] * _FACTOR_X + bits[1] * _FACTOR_Y + bits[2] * _FACTOR_Z
+        hashes[i - start] = (mixed ^ (mixed >> np.uint64(31))) * _FACTOR_X
+
+
+@njit(cache=True, nogil=True)
+def collect_marked(xyz, start, stop, first, edge, n_y, n_z, table_keys, table_ids, found, cells):
+    """List the points start … stop that lie in marked cubes, with their cubes' numbers."""
+    mask = np.int64(table_keys.shape[0] - 1)
+    n = 0
+    for i in range(start, stop):
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        slot = slot_of(key, table_keys, mask)
+        if table_keys[slot] != EMPTY:
+            found[n] = i
+            cells[n] = table_ids[slot]
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def nearest_in_cells(
+    xyz, sample, first, edge, n_y, n_z, table_keys, table_ids, points, starts, k, reach
+):
+    """Write each sample's distance to its `k` nearest points, itself among them.
+
+    `points` lists the points of each marked cube; those around the sample are marked. nan
+    where fewer than `k` are within `edge`.
+    """
+    mask = np.int64(table_keys.shape[0] - 1)
+    nearest = np.empty(k, np.float64)
+    for s in range(sample.shape[0]):
+        x, y, z = sample[s, 0], sample[s, 1], sample[s, 2]
+        key = voxel_key(x, y, z, first, edge, n_y, n_z)
+        nearest[:] = math.inf
+        for dx in range(-1, 2):
+            for dy in range(-1, 2):
+                for dz in range(-1, 2):
+                    near = key + (dx * n_y + dy) * n_z + dz
+                    cell = table_ids[slot_of(near, table_keys, mask)]
+                    for m in range(starts[cell], starts[cell + 1]):
+                        i = points[m]
+                        u, v, w = xyz[i, 0] - x, xyz[i, 1] - y, xyz[i, 2] - z
+                        d2 = u * u + v * v + w * w
+                        if d2 >= nearest[k - 1]:
+                            continue
+                        j = k - 1
+                        while j > 0 and nearest[j - 1] > d2:
+                            nearest[j] = nearest[j - 1]
+                            j -= 1
+                        nearest[j] = d2
+        d = math.sqrt(nearest[k - 1])
+        reach[s] = d if d <= edge else math.nan

@@ -1,0 +1,127 @@
+"""How far apart the points of a cloud usually are."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipecore._kernels import spacing as kernels
+from pipecore._kernels.grouping import group_by_label
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress, Progress
+from pipecore.surface.grid import GridFrame, bounds, table_of
+
+CHUNK = 1_000_000
+WIDEST_GRID = 2.0**20
+"""Cells along the longest side of a grid at most."""
+
+
+def median_spacing(
+    xyz: NDArray[np.floating],
+    n_sample: int = 4000,
+    n_neighbours: int = 8,
+    among: NDArray[np.bool_] | None = None,
+    progress: Progress = NoProgress(),
+) -> float:
+    """Typical distance between neighbouring points on the scanned surfaces, metres.
+
+    From the radius of the disc that holds `n_neighbours` points around sampled points:
+    close pairs of overlapping scans do not make it smaller than it is. `among` says around
+    which points, where others lack neighbours.
+    """
+    if len(xyz) < 2:
+        return 0.0
+    places = xyz if among is None or not among.any() else xyz[among]
+    n_sample = min(n_sample, len(places))
+    sample = np.asarray(places[sample_by_place(places, n_sample, progress)], np.float64)
+    n_neighbours = min(n_neighbours, len(xyz) - 1)
+    reach = _reach_of_neighbours(xyz, sample, n_neighbours + 1, progress)
+    return spacing_from_reach(reach, n_neighbours)
+
+
+def spacing_from_reach(reach: NDArray[np.float64], n_neighbours: int) -> float:
+    """Spacing of points from the distances to their nth neighbour."""
+    return float(np.median(reach) * np.sqrt(np.pi / (n_neighbours + 1)))
+
+
+def sample_by_place(
+    xyz: NDArray[np.floating], n_sample: int, progress: Progress = NoProgress()
+) -> NDArray[np.intp]:
+    """Positions of points drawn by a hash of their coordinates, so in any order the same."""
+    # The hashes are spread evenly: those below this bound hold the smallest ones.
+    share = min(1.0, (n_sample + 10 * np.sqrt(n_sample)) / len(xyz))
+    while True:
+        bound = np.uint64(min(share * 2.0**64, 2.0**64 - 2048))
+        drawn: dict[int, tuple[NDArray[np.intp], NDArray[np.uint64]]] = {}
+
+        def draw(start: int, stop: int) -> None:
+            hashes = np.empty(stop - start, np.uint64)
+            kernels.hash_places(xyz, start, stop, hashes)
+            rows = np.flatnonzero(hashes <= bound)  # noqa: B023 - used within the round
+            drawn[start] = rows + start, hashes[rows]  # noqa: B023
+
+        for_chunks(draw, len(xyz), CHUNK, "thinning", progress, (0.0, 0.05))
+        rows = np.concatenate([drawn[start][0] for start in sorted(drawn)])
+        if share == 1.0:
+            rows = np.arange(len(xyz))
+        if len(rows) >= n_sample:
+            break
+        share = min(1.0, 4 * share)  # Equal points have equal hashes.
+    hashes = np.empty(len(rows), np.uint64)
+    kernels.hash_places(np.ascontiguousarray(xyz[rows]), 0, len(rows), hashes)
+    return rows[np.argpartition(hashes, n_sample - 1)[:n_sample]]
+
+
+def _reach_of_neighbours(
+    xyz: NDArray[np.floating], sample: NDArray[np.float64], k: int, progress: Progress
+) -> NDArray[np.float64]:
+    """Distance of each sample within which `k` points lie, itself among them.
+
+    Only the cubes around the samples are looked into. They grow until most samples have
+    their points within a cube's edge. The others' distance is further than the median, so
+    that it need not be known: it is given as infinite.
+    """
+    low, high = bounds(xyz)
+    least = max(float((high - low).max()) / WIDEST_GRID, 1e-9)
+    nearest, _ = cKDTree(sample).query(sample, min(2, len(sample)))
+    apart = float(np.median(nearest.reshape(len(sample), -1)[:, -1]))
+    # Were all points as far apart as the sample's, spread over surfaces.
+    edge = max(apart * np.sqrt(k * len(sample) / len(xyz)), least)
+    while True:
+        reach = _within_cells(xyz, sample, k, GridFrame.around(low, high, edge), progress)
+        if 2 * np.isfinite(reach).sum() > len(sample) + 1 or edge > 2 * np.linalg.norm(high - low):
+            return np.where(np.isfinite(reach), reach, np.inf)
+        edge *= 2.0
+
+
+def _within_cells(
+    xyz: NDArray[np.floating],
+    sample: NDArray[np.float64],
+    k: int,
+    frame: GridFrame,
+    progress: Progress,
+) -> NDArray[np.float64]:
+    """Distance of each sample to its `k` nearest points; nan where beyond a cell's edge."""
+    steps = np.arange(-1, 2)
+    around = (
+        (steps[:, None, None] * frame.n_y + steps[:, None]) * frame.n_z + steps
+    ).ravel()  # fmt: skip
+    marked = np.unique(frame.keys(sample)[:, None] + around)
+    table = table_of(marked)
+    collected: dict[int, tuple[NDArray[np.int64], NDArray[np.int32]]] = {}
+
+    def collect(start: int, stop: int) -> None:
+        found, cells = np.empty(stop - start, np.int64), np.empty(stop - start, np.int32)
+        n = kernels.collect_marked(xyz, start, stop, *frame.numbers, *table, found, cells)
+        collected[start] = found[:n].copy(), cells[:n].copy()
+
+    for_chunks(collect, len(xyz), CHUNK, "thinning", progress, (0.05, 0.1))
+    points = np.concatenate([collected[start][0] for start in sorted(collected)])
+    cells = np.concatenate([collected[start][1] for start in sorted(collected)])
+    order, starts = group_by_label(cells, len(marked))
+    reach = np.empty(len(sample))
+    # The points are copied: what lies together is read together.
+    near = np.asarray(xyz[points[order]], np.float64)
+    kernels.nearest_in_cells(
+        near, sample, *frame.numbers, *table, np.arange(len(near)), starts, k, reach
+    )
+    return reach
