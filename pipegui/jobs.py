@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject, Signal
 
@@ -27,8 +27,12 @@ from pipegui.worker import (
     Worker,
 )
 
+if TYPE_CHECKING:
+    from pipecore.preview import Plan
+
 ReadFunction = Callable[[Path, Settings, JobProgress], PointCloud]
 DetectFunction = Callable[[PointCloud, Settings, JobProgress], Result]
+PlanFunction = Callable[[PointCloud, Settings, JobProgress], "Plan | None"]
 
 
 def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointCloud:
@@ -60,11 +64,24 @@ Change = Callable[[JobProgress], Result]
 """Works out the next result."""
 
 
+def plan_cuts(cloud: PointCloud, settings: Settings, progress: JobProgress) -> "Plan | None":
+    """Tell with pipecore what a detection would cut."""
+    from pipecore.preview import plan_stacks  # noqa: PLC0415 - numba takes its time
+
+    return plan_stacks(cloud, settings, progress)
+
+
 @dataclass(frozen=True)
 class _Request:
     title: str
+    """"" for a glance."""
     work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
+    failed: Callable[[str], None] | None = None
+
+    @property
+    def is_glance(self) -> bool:
+        return not self.title
 
 
 class Jobs(QObject):
@@ -94,19 +111,22 @@ class Jobs(QObject):
         self,
         read: ReadFunction = read_file,
         detect: DetectFunction = detect_pipes,
+        plan: PlanFunction = plan_cuts,
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
         self._read, self._detect = read, detect
+        self.plan = plan
         self._waiting: deque[_Request] = deque()
+        self._glance: _Request | None = None
         self._running: _Request | None = None
         self.worker = Worker(self)
         self.worker.happened.connect(self._take)
 
     @property
     def is_busy(self) -> bool:
-        """Whether something runs."""
-        return self._running is not None
+        """Whether something runs that was asked for; a glance does not count."""
+        return self._running is not None and not self._running.is_glance
 
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
         """Read each file as a scan of its own."""
@@ -142,11 +162,28 @@ class Jobs(QObject):
         """Write something that takes its time."""
         self._request(_Request("Exporting", write, lambda _: self.written.emit(path)))
 
+    def glance(
+        self,
+        work: Callable[[JobProgress], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Do something small once nothing else runs; nobody is told of it but the caller.
+
+        A newer glance takes its place, and work that is asked for goes before it.
+        """
+        self._glance = _Request("", work, done, failed)
+        if self._running is None:
+            self._next()
+        elif self._running.is_glance:
+            self.worker.cancel()
+
     def cancel(self) -> None:
         """Stop what runs, and forget what waits."""
         self._waiting.clear()
         if self._running is not None:
-            self.cancelling.emit()
+            if self.is_busy:
+                self.cancelling.emit()
             self.worker.cancel()
 
     def close(self) -> None:
@@ -159,26 +196,35 @@ class Jobs(QObject):
         self._waiting.append(request)
         if self._running is None:
             self._next()
+        elif self._running.is_glance:
+            self.worker.cancel()
 
     def _next(self) -> None:
         if self._waiting:
             self._running = self._waiting.popleft()
+        elif self._glance is not None:
+            self._running, self._glance = self._glance, None
+        if self._running is not None:
             self.worker.start(self._running.title, self._running.work)
         self.busy_changed.emit(self.is_busy)
 
     def _take(self, event: Event) -> None:
         match event:
-            case Started():
+            case Started() if self.is_busy:
                 self.started.emit(event.title)
-            case Progressed():
+            case Progressed() if self.is_busy:
                 self.progressed.emit(event)
             case Finished() | Failed() | Cancelled():
                 self._end(event)
 
     def _end(self, event: Finished | Failed | Cancelled) -> None:
         request, self._running = self._running, None
-        self.ended.emit()
-        if request is not None:
+        if request is not None and request.is_glance:
+            if isinstance(event, Cancelled) and self._waiting and self._glance is None:
+                self._glance = request  # it made way for work that was asked for
+            _tell_of_glance(request, event)
+        elif request is not None:
+            self.ended.emit()
             match event:
                 case Finished():
                     request.done(event.value)
@@ -189,3 +235,10 @@ class Jobs(QObject):
         # What was done may have asked for more.
         if self._running is None:
             self._next()
+
+
+def _tell_of_glance(request: _Request, event: Finished | Failed | Cancelled) -> None:
+    if isinstance(event, Finished):
+        request.done(event.value)
+    elif isinstance(event, Failed) and request.failed is not None:
+        request.failed(event.message)

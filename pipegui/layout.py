@@ -39,6 +39,7 @@ class Panels:
     clip: ClipBar
     profiles: ProfileBar
     docks: dict[str, QDockWidget]
+    plots: QTabWidget | None = None
 
     @classmethod
     def make(cls) -> "Panels":
@@ -55,6 +56,13 @@ class Panels:
             ProfileBar(),
             {},
         )
+
+    def show_plot(self, widget: QWidget) -> None:
+        """Bring a plot forward."""
+        assert self.plots is not None
+        self.docks["Element"].show()
+        self.docks["Element"].raise_()
+        self.plots.setCurrentWidget(widget)
 
     def open_stack_editor(self) -> None:
         """Bring the stacks panel forward with its editor open."""
@@ -87,13 +95,14 @@ def arrange(window: "MainWindow") -> None:
     column.addWidget(panels.clip)
     window.setCentralWidget(centre)
 
-    plots = QTabWidget()
+    panels.plots = plots = QTabWidget()
     plots.setObjectName("plots")
     plots.setDocumentMode(True)
     for title, widget in (
         ("Radius", parts.radius_plot),
         ("Map", parts.map),
         ("Section", parts.section),
+        ("Preview", parts.preview),
     ):
         plots.addTab(widget, title)
 

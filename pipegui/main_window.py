@@ -22,6 +22,7 @@ from pipegui.menu_actions import MenuActions
 from pipegui.panels.project_tree import NodeKind
 from pipegui.panels.status import StatusBar
 from pipegui.parts import Parts
+from pipegui.previewing import Previews
 from pipegui.toolbar import ToolBar
 from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
 
@@ -51,6 +52,7 @@ class MainWindow(QMainWindow):
         self.history = History(changed=self._show)
         self._state = ViewState()
         self.panels = Panels.make()
+        self.previews = Previews(jobs, self)
         self.menu_actions = MenuActions(self)
         self.edits = Edits(self)
         self.actions_ = Actions(self, wiring.handlers(self))
@@ -64,6 +66,7 @@ class MainWindow(QMainWindow):
         self.menu_actions.list_history()
         wiring.connect_panels(self)
         wiring.connect_views(self)
+        wiring.connect_previews(self)
         wiring.connect_jobs(self)
         QApplication.styleHints().colorSchemeChanged.connect(self._change_scheme)
         self._apply(resolve(self.history.document), everything=True)
@@ -155,6 +158,7 @@ class MainWindow(QMainWindow):
             "window": self._apply_window,
             "tree": panels.tree.apply,
             "stacks": panels.stacks.apply,
+            "planning": lambda state: self.previews.apply(state.cloud, state.settings),
             "settings": panels.settings.apply,
             "table": panels.table.apply,
             "clip": panels.clip.apply,

@@ -9,12 +9,12 @@ Nothing here knows Qt or VTK.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.settings import Settings, StackSettings
+from pipecore.settings import ProfileSettings, Settings, StackSettings
 from pipecore.types import (
     NO_ID,
     OWN_STACK,
@@ -27,8 +27,20 @@ from pipecore.types import (
     Stack,
 )
 from pipegui import cuts, selecting
-from pipegui.document import Box, ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.document import (
+    Box,
+    ColourBy,
+    Document,
+    Measurement,
+    ProfileKey,
+    Scan,
+    Selection,
+    ViewOptions,
+)
 from pipegui.section_cut import SectionCut, cut_section
+
+if TYPE_CHECKING:
+    from pipecore.preview import Plan, ProfilePreview
 
 Array = NDArray[np.float64]
 
@@ -182,10 +194,40 @@ class StacksState:
     """The stacks panel: what to cut next, and what the last detection cut."""
 
     settings: StackSettings = StackSettings()
+    profiles: ProfileSettings = ProfileSettings()
     stacks: tuple[Stack, ...] = ()
     n_profiles: tuple[int, ...] = ()
     """Profiles with an accepted ellipse, per stack."""
     shown_stack: int = NO_ID
+    measured: Measurement | None = None
+    """The last distance that was measured: two points give a direction."""
+
+
+@dataclass(frozen=True)
+class PlanningState:
+    """What stacks and profiles are previewed of; clouds are compared by identity."""
+
+    cloud: PointCloud | None = None
+    settings: Settings = Settings()
+
+
+@dataclass(frozen=True)
+class PlanState:
+    """What a detection would cut, or a word on why it is not known."""
+
+    plan: "Plan | None" = None
+    message: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PreviewState:
+    """A profile of the plan's stack `row`, not yet cut while `preview` is None."""
+
+    plan: "Plan | None" = None
+    row: int = 0
+    index: int = 0
+    preview: "ProfilePreview | None" = None
+    message: str = ""
 
 
 @dataclass(frozen=True)
@@ -242,6 +284,7 @@ class ViewState:
     scene: SceneState = SceneState()
     tree: TreeState = TreeState()
     stacks: StacksState = StacksState()
+    planning: PlanningState = PlanningState()
     settings: Settings = Settings()
     table: TableState = TableState()
     clip: ClipState = ClipState()
@@ -278,10 +321,13 @@ def resolve(document: Document) -> ViewState:
         tree=TreeState(document.scans, document.active, selection, view.hidden_elements),
         stacks=StacksState(
             document.settings.stacks,
+            document.settings.profiles,
             result.stacks if result else (),
             cuts.count_profiles(result) if result else (),
             view.shown_stack,
+            next((m for m in reversed(view.measurements) if m.end is not None), None),
         ),
+        planning=PlanningState(scan.cloud if scan else None, document.settings),
         settings=document.settings,
         table=TableState(result, selection.deformation_id, scan.reviews if scan else {}),
         clip=ClipState(view.clip_box, scan.cloud if scan else None, selection != Selection()),

@@ -115,6 +115,9 @@ def connect_panels(window: "MainWindow") -> None:
     panels.clip.closed.connect(lambda: do(commands.set_view, clip_box=None))
     panels.profiles.chosen.connect(lambda i: do(view_commands.show_profile, i))
     panels.profiles.stepped.connect(lambda by: do(view_commands.step_stack_profile, by))
+    panels.stacks.setting_changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
+    panels.stacks.points_wanted.connect(lambda: do(view_commands.choose_tool, Tool.MEASURE))
+    panels.stacks.points_taken.connect(lambda: _take_points(window))
     bar = window.tool_bar
     bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
@@ -149,10 +152,34 @@ def connect_views(window: "MainWindow") -> None:
     parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
     parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
     parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
-    for plot in (parts.radius_plot, parts.section, parts.map):
+    for plot in (parts.radius_plot, parts.section, parts.map, parts.preview):
         plot.save_requested.connect(
             lambda ending, plot=plot: window.menu_actions.save_plot(plot, ending)
         )
+
+
+def connect_previews(window: "MainWindow") -> None:
+    """Connect the look at stacks and profiles before a detection."""
+    previews, stacks, view = window.previews, window.panels.stacks, window.parts.preview
+    previews.planned.connect(stacks.show_plan)
+    previews.previewed.connect(view.apply)
+    stacks.seen.connect(previews.watch_list)
+    view.seen.connect(previews.watch_profile)
+    view.chosen.connect(previews.choose)
+    view.step_requested.connect(previews.step)
+
+    def look(row: int) -> None:
+        window.panels.show_plot(view)
+        previews.choose(row)
+
+    stacks.preview_wanted.connect(look)
+
+
+def _take_points(window: "MainWindow") -> None:
+    """Put the measuring tool away with the distance that gave a stack its direction."""
+    window.do(view_commands.delete_measurement, -1)
+    if window.document.view.tool is Tool.MEASURE:
+        window.do(view_commands.choose_tool, Tool.MEASURE)
 
 
 def connect_jobs(window: "MainWindow") -> None:

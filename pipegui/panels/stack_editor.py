@@ -15,6 +15,8 @@ class StackEditor(QWidget):
     """Direction and width of one stack, in place."""
 
     accepted = Signal(tuple)
+    points_wanted = Signal()
+    """Two points are to be picked in the 3D view."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -51,12 +53,17 @@ class StackEditor(QWidget):
         self.from_view.setToolTip("The direction in which the 3D view looks")
         self.from_view.clicked.connect(self._take_view)
         grid.addWidget(self.from_view, 2, 0)
+        self.from_points = QPushButton("From two points")
+        self.from_points.setToolTip("Click two points in the 3D view, such as along a pipe")
+        self.from_points.clicked.connect(self._want_points)
+        self.from_points.setMinimumWidth(1)
+        grid.addWidget(self.from_points, 4, 1, 1, 3)
         grid.addWidget(self.width_mm, 3, 1, 1, 3)
         buttons = QHBoxLayout()
         buttons.addStretch()
         buttons.addWidget(cancel)
         buttons.addWidget(self.accept_button)
-        grid.addLayout(buttons, 4, 0, 1, 4)
+        grid.addLayout(buttons, 5, 0, 1, 4)
 
     def _component(self, name: str) -> QuietSpinBox:
         field = QuietSpinBox()
@@ -76,6 +83,7 @@ class StackEditor(QWidget):
         self._set(np.array(direction[:3]))
         self.width_mm.setValue(direction[3] if len(direction) > 3 else 0.0)
         self.from_view.setVisible(self.view_direction is not None)
+        self.from_points.setText("From two points")
         self.show()
         self.components[0].setFocus()
 
@@ -86,6 +94,18 @@ class StackEditor(QWidget):
     def _take_view(self) -> None:
         if self.view_direction is not None:
             self._set(np.round(self.view_direction(), 3))
+
+    def _want_points(self) -> None:
+        self.from_points.setText("Click two points …")
+        self.points_wanted.emit()
+
+    def take_points(self, start: tuple[float, ...], end: tuple[float, ...] | None) -> None:
+        """Take the direction from one point to another."""
+        self.from_points.setText("From two points")
+        offset = np.subtract(end if end is not None else start, start)
+        length = float(np.linalg.norm(offset))
+        if length > 0:
+            self._set(np.round(offset / length, 3))
 
     def _direction(self) -> tuple[float, ...]:
         return tuple(round(component.value(), 3) for component in self.components)

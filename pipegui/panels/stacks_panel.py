@@ -4,9 +4,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
+    QGridLayout,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -17,12 +19,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipecore.settings import DirectionPreset
+from pipecore.settings import DirectionPreset, ProfileMethod
 from pipecore.types import NO_ID, Stack
 from pipegui import theme
 from pipegui.panels.stack_editor import StackEditor
-from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
-from pipegui.view_state import StacksState
+from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
+from pipegui.view_state import PlanState, StacksState
 
 PRESET_TEXT = {
     DirectionPreset.AUTOMATIC: "Automatic",
@@ -30,11 +32,20 @@ PRESET_TEXT = {
     DirectionPreset.AXES_AND_DIAGONALS: "Axes and diagonals",
     DirectionPreset.NONE: "Only my own",
 }
-NAME, WIDTH, PROFILES = range(3)
+NAME, WIDTH, PROFILES, SHARE = range(4)
+HINTS = (
+    "Tick a stack that was cut to show its profiles in colour",
+    "Thickness of a profile",
+    "Before a detection: how many profiles would be cut. After it: how many show an ellipse.",
+    "Share of the surface that the stack cuts steeply enough to use, judged on a sample",
+)
 CHECKED = Qt.CheckState.Checked
 OWN_INDEX = Qt.ItemDataRole.UserRole
 STACK_ID = int(Qt.ItemDataRole.UserRole) + 1
+PLAN_ROW = int(Qt.ItemDataRole.UserRole) + 2
 SAME_DIRECTION = np.cos(np.deg2rad(0.1))
+ALIKE_DIRECTION, ALIKE_WIDTH = np.cos(np.deg2rad(5.0)), 0.2
+"""A planned stack tells of a cut one within these: the sample's directions differ a little."""
 
 
 class StacksPanel(QWidget):
@@ -46,6 +57,15 @@ class StacksPanel(QWidget):
     removed = Signal(int)
     shown = Signal(int)
     """Id of the stack whose profiles are to be shown in colour, or `NO_ID`."""
+    setting_changed = Signal(str, object)
+    """Dotted key and new value."""
+    preview_wanted = Signal(int)
+    """Row of a stack in the plan."""
+    points_wanted = Signal()
+    """Two points are to be picked in the 3D view."""
+    points_taken = Signal()
+    seen = Signal(bool)
+    """Whether anybody looks: what nobody sees need not be planned."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -61,9 +81,12 @@ class StacksPanel(QWidget):
         )
         self.preset.setMinimumContentsLength(8)
         self.preset.currentIndexChanged.connect(self._tell_preset)
+        self._make_cutting()
         self.list = QTreeWidget()
         self.list.setAccessibleName("Stacks")
-        self.list.setHeaderLabels(["Stack", "Width", "Profiles"])
+        self.list.setHeaderLabels(["Stack", "Width", "Profiles", "Cut"])
+        for column, hint in enumerate(HINTS):
+            self.list.headerItem().setToolTip(column, hint)
         self.list.setRootIsDecorated(False)
         self.list.setIndentation(0)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -72,20 +95,80 @@ class StacksPanel(QWidget):
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
         header.setSectionResizeMode(WIDTH, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(PROFILES, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(SHARE, QHeaderView.ResizeMode.ResizeToContents)
         self.list.itemChanged.connect(self._tell_shown)
         self.list.currentItemChanged.connect(self._enable)
-        self.list.itemDoubleClicked.connect(lambda *_: self.edit())
+        self.list.itemActivated.connect(lambda *_: self._activate())
         self.add_button = self._button("plus", "Add a stack", self.add)
         self.remove_button = self._button("minus", "Remove the selected own stack", self.remove)
         self.edit_button = self._button("pencil-outline", "Edit the selected own stack", self.edit)
+        tip = "Preview a profile of the selected stack with its curves"
+        self.preview_button = self._button("eye-outline", tip, self.preview)
         self.editor = StackEditor()
         self.editor.accepted.connect(self._accept)
+        self.editor.points_wanted.connect(self._want_points)
+        self._waits_for_points = False
+        self._plan = PlanState()
         self.editor.hide()
         self._edited: int | None = None
-        self._empty = EmptyHint("The stacks of profiles appear here once a scan has been detected.")
+        self._empty = EmptyHint(
+            "Open a scan to see in which directions it would be cut, and how well."
+        )
+        self._note = QLabel()
+        self._note.setProperty("muted", True)
+        self._note.setContentsMargins(theme.SPACING, 0, theme.SPACING, theme.SPACING // 2)
+        self._note.hide()
         self._lay_out()
         self._state = StacksState()
         self._list(self._state)
+
+    def _make_cutting(self) -> None:
+        """Fields for how profiles are cut and joined."""
+        self.width_mm = self._length("Profile width", "stacks.width_mm")
+        self.width_mm.setToolTip("Thickness of a profile; 0 follows the spacing of the points")
+        self.gap_mm = self._length("Largest gap", "profiles.gap_mm")
+        self.gap_mm.setToolTip(
+            "Points of one curve are at most this far apart; 0 follows the spacing of the points"
+        )
+        self.method = QuietComboBox()
+        self.method.setAccessibleName("Method")
+        self.method.setToolTip(
+            "Proximity alone, or proximity and splitting where the curvature changes sharply"
+        )
+        for method in ProfileMethod:
+            self.method.addItem(str(method).capitalize(), method)
+        self.method.currentIndexChanged.connect(
+            lambda _: self._tell_setting(
+                "profiles.method", ProfileMethod(self.method.currentData())
+            )
+        )
+        self._cutting = QGridLayout()
+        self._cutting.setContentsMargins(theme.SPACING, 0, theme.SPACING, 0)
+        self._cutting.setSpacing(theme.SPACING // 2)
+        for place, (text, field, span) in enumerate(
+            (("Width", self.width_mm, 1), ("Gap", self.gap_mm, 1), ("Method", self.method, 3))
+        ):
+            label = QLabel(text)
+            label.setBuddy(field)
+            row, column = divmod(place, 2)
+            self._cutting.addWidget(label, row, 2 * column)
+            self._cutting.addWidget(field, row, 2 * column + 1, 1, span)
+        for column in (1, 3):
+            self._cutting.setColumnStretch(column, 1)
+
+    def _length(self, name: str, key: str) -> QuietSpinBox:
+        field = QuietSpinBox()
+        field.setAccessibleName(name)
+        field.setRange(0, 1000)
+        field.setSuffix(" mm")
+        field.setSpecialValueText("automatic")
+        field.setMinimumWidth(8 * theme.SPACING)
+        field.valueChanged.connect(lambda value: self._tell_setting(key, value))
+        return field
+
+    def _tell_setting(self, key: str, value: object) -> None:
+        if not self._applying:
+            self.setting_changed.emit(key, value)
 
     def _button(self, icon: str, tip: str, act: Callable[[], None]) -> QToolButton:
         button = QToolButton()
@@ -102,7 +185,8 @@ class StacksPanel(QWidget):
         label.setBuddy(self.preset)
         top.addWidget(label)
         top.addWidget(self.preset, 1)
-        for button in (self.add_button, self.remove_button, self.edit_button):
+        buttons = (self.preview_button, self.add_button, self.remove_button, self.edit_button)
+        for button in buttons:
             top.addWidget(button)
         top.setContentsMargins(theme.SPACING, theme.SPACING, theme.SPACING, 0)
         top.setSpacing(theme.SPACING // 2)
@@ -110,18 +194,32 @@ class StacksPanel(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(theme.SPACING // 2)
         column.addLayout(top)
+        column.addLayout(self._cutting)
         column.addWidget(self.editor)
         column.addWidget(self.list, 1)
         column.addWidget(self._empty, 1)
+        column.addWidget(self._note)
 
     def apply(self, state: StacksState) -> None:
         """Show a state."""
         before, self._state = self._state, state
-        if replace(state, shown_stack=before.shown_stack) == before:
+        with self._applying:
+            self.width_mm.setValue(state.settings.width_mm)
+            self.gap_mm.setValue(state.profiles.gap_mm)
+            self.method.setCurrentIndex(self.method.findData(state.profiles.method))
+        if self._waits_for_points and state.measured not in (None, before.measured):
+            self._take_points(state)
+        as_before = {"shown_stack": before.shown_stack, "measured": before.measured}
+        if replace(state, profiles=before.profiles, **as_before) == before:
             # A tick is answered in place: its item must outlive the signal that it sends.
             self._show_ticks(state.shown_stack)
         else:
             self._list(state)
+
+    def show_plan(self, plan: PlanState) -> None:
+        """Show what a detection would cut."""
+        self._plan = plan
+        self._list(self._state)
 
     def _show_ticks(self, shown_stack: int) -> None:
         with self._applying:
@@ -144,6 +242,8 @@ class StacksPanel(QWidget):
                 if match is not None:
                     del own[match]
                 self._add_cut(stack, n_profiles, match, stack.stack_id == state.shown_stack)
+            if not state.stacks and self._plan.plan is not None:
+                self._add_plan(own)
             default = state.settings.width_mm
             for index, direction in own.items():
                 self._add_planned(index, direction, default)
@@ -154,17 +254,60 @@ class StacksPanel(QWidget):
         has_stacks = self.list.topLevelItemCount() > 0
         self.list.setVisible(has_stacks)
         self._empty.setVisible(not has_stacks)
+        self._note.setText(self._plan.message or self._share_text())
+        self._note.setVisible(bool(self._note.text()))
         self._enable()
 
-    def _add_cut(self, stack: Stack, n_profiles: int, own: int | None, is_shown: bool) -> None:
+    def _share_text(self) -> str:
+        plan = self._plan.plan
+        if plan is None or not np.isfinite(plan.share):
+            return ""
+        return f"Together they cut {100 * plan.share:.0f} % of the surface well."
+
+    def _add_plan(self, own: dict[int, tuple[float, ...]]) -> None:
+        """List the stacks of the plan; own ones are taken out of `own`."""
+        assert self._plan.plan is not None
+        for row, planned in enumerate(self._plan.plan.stacks):
+            match = next((i for i, d in own.items() if _is_of(planned.stack, d)), None)
+            if match is not None:
+                del own[match]
+            item = self._add_item(planned.stack, f"{planned.n_profiles:,}", match, row)
+            font = item.font(NAME)
+            font.setItalic(True)
+            item.setFont(NAME, font)
+            direction = ", ".join(f"{c:.3f}" for c in planned.stack.direction)
+            item.setToolTip(NAME, f"Direction {direction}\nWill be cut at the next detection.")
+
+    def _row_of_plan(self, stack: Stack) -> int | None:
+        """Row of the planned stack that is like a cut one."""
+        rows = () if self._plan.plan is None else enumerate(self._plan.plan.stacks)
+        for row, planned in rows:
+            is_parallel = abs(float(planned.stack.direction @ stack.direction)) > ALIKE_DIRECTION
+            ratio = planned.stack.width / stack.width
+            if is_parallel and abs(ratio - 1) < ALIKE_WIDTH:
+                return row
+        return None
+
+    def _add_item(
+        self, stack: Stack, n_profiles: str, own: int | None, row: int | None
+    ) -> QTreeWidgetItem:
         item = QTreeWidgetItem(self.list)
         item.setText(NAME, stack.name or f"Stack {stack.stack_id}")
         item.setText(WIDTH, f"{1000 * stack.width:.0f} mm")
-        item.setText(PROFILES, f"{n_profiles:,}")
-        item.setTextAlignment(PROFILES, Qt.AlignmentFlag.AlignRight)
+        item.setText(PROFILES, n_profiles)
+        item.setData(NAME, OWN_INDEX, own)
+        item.setData(NAME, PLAN_ROW, row)
+        if row is not None and self._plan.plan is not None:
+            share = self._plan.plan.stacks[row].share
+            item.setText(SHARE, f"{100 * share:.0f} %" if np.isfinite(share) else "–")
+        for column in (PROFILES, SHARE):
+            item.setTextAlignment(column, Qt.AlignmentFlag.AlignRight)
+        return item
+
+    def _add_cut(self, stack: Stack, n_profiles: int, own: int | None, is_shown: bool) -> None:
+        item = self._add_item(stack, f"{n_profiles:,}", own, self._row_of_plan(stack))
         item.setCheckState(NAME, CHECKED if is_shown else Qt.CheckState.Unchecked)
         item.setData(NAME, STACK_ID, stack.stack_id)
-        item.setData(NAME, OWN_INDEX, own)
         direction = ", ".join(f"{c:.3f}" for c in stack.direction)
         item.setToolTip(NAME, f"Direction {direction}\nTick to show its profiles in colour.")
 
@@ -192,6 +335,7 @@ class StacksPanel(QWidget):
     def _enable(self, *_: object) -> None:
         for button in (self.remove_button, self.edit_button):
             button.setEnabled(self._own_index() is not None)
+        self.preview_button.setEnabled(self._plan.plan is not None)
 
     def _tell_preset(self) -> None:
         if not self._applying:
@@ -202,6 +346,40 @@ class StacksPanel(QWidget):
             return
         is_checked = item.checkState(NAME) == CHECKED
         self.shown.emit(item.data(NAME, STACK_ID) if is_checked else NO_ID)
+
+    def preview(self) -> None:
+        """Ask to see a profile of the selected stack, or of the first."""
+        item = self.list.currentItem()
+        row = None if item is None else item.data(NAME, PLAN_ROW)
+        self.preview_wanted.emit(row or 0)
+
+    def _activate(self) -> None:
+        if self._own_index() is not None:
+            self.edit()
+        elif self.preview_button.isEnabled():
+            self.preview()
+
+    def _want_points(self) -> None:
+        self._waits_for_points = True
+        self.points_wanted.emit()
+
+    def _take_points(self, state: StacksState) -> None:
+        """Make the direction of two points that were picked that of the stack."""
+        assert state.measured is not None
+        self._waits_for_points = False
+        self.editor.take_points(state.measured.start, state.measured.end)
+        # The state that brought the points is still being shown to the others.
+        QTimer.singleShot(0, self, self.points_taken.emit)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Tell that somebody looks."""
+        super().showEvent(event)
+        self.seen.emit(True)
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802
+        """Tell that nobody looks any more."""
+        super().hideEvent(event)
+        self.seen.emit(False)
 
     def add(self) -> None:
         """Open the editor for a new stack."""

@@ -84,9 +84,11 @@ def make_window(
     cloud, result = make_cloud(), make_result()
     windows: list[MainWindow] = []
 
-    def make(read=lambda *_: cloud, detect=lambda *_: result, parts=None) -> MainWindow:
+    def make(
+        read=lambda *_: cloud, detect=lambda *_: result, parts=None, plan=lambda *_: None
+    ) -> MainWindow:
         stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect), stored)
+        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect, plan), stored)
         windows.append(window)
         window.resize(1366, 768)
         with qtbot.waitActive(window):  # without it keys do not reach the shortcuts

@@ -68,10 +68,16 @@ class FakeSection(FakeView):
     step_requested = Signal(int)
 
 
+class FakePreview(FakeView):
+    seen = Signal(bool)
+    chosen = Signal(int, object)
+    step_requested = Signal(int)
+
+
 class FakeMap(FakeView):
     spot_clicked = Signal(float, float)
     deformation_clicked = Signal(int)
 
 
 def make_fake_parts() -> Parts:
-    return Parts(FakeScene(), FakeRadiusPlot(), FakeSection(), FakeMap())
+    return Parts(FakeScene(), FakeRadiusPlot(), FakeSection(), FakeMap(), FakePreview())
