@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import cho_factor, cho_solve
 
+from pipecore._kernels import series as kernels
 from pipecore.ellipses.nonlinear import NoFit
 from pipecore.geometry import Array
 
@@ -135,8 +135,8 @@ class SectionCurve:
         weighted by how well it is known there, less what the noise alone makes of it.
         """
         theta = np.concatenate(self.clocks())
-        radius = float(np.mean(self.radius_at(theta)))
-        value, variance = self.curvature_at(theta), self.curvature_sd_at(theta) ** 2
+        value, variance = np.empty((2, len(theta)))
+        radius = float(kernels.curvature(theta, self.coefficients, self.root, value, variance))
         weight = 1.0 / (variance + (0.05 / radius) ** 2)
         weight /= weight.sum()
         spread = float(weight @ (value - weight @ value) ** 2 - weight @ variance)
@@ -184,17 +184,7 @@ def fit_section(
         weight, within = np.ones(n), 0.0
 
     basis = _basis(theta, order)
-    robust = np.ones(len(theta))
-    freedom = max(len(theta) - basis.shape[1], 1) / len(theta)
-    for _ in range(N_ROUNDS):
-        weighted = (weight * robust)[:, None] * basis
-        normal = weighted.T @ basis
-        # On open arcs waves look alike; a hair of ridge is enough to find who strays.
-        normal.flat[:: len(normal) + 1] += 1e-9 * normal[0, 0]
-        solution = cho_solve(cho_factor(normal), weighted.T @ r)
-        residual = np.abs(r - basis @ solution) * np.sqrt(weight)
-        scale = max(1.4826 * float(np.median(residual)) / np.sqrt(freedom), 1e-12)
-        robust = np.clip(1.0 - (residual / (TUKEY * scale)) ** 2, 1e-6, None) ** 2
+    residual, scale = kernels.find_strays(basis, r, weight, N_ROUNDS, TUKEY)
     # Weights that bend the tails of the noise would make it look smaller: all or nothing.
     inside = residual < OUTLYING * scale
     theta, r, weight = theta[inside], r[inside], weight[inside]
@@ -238,15 +228,9 @@ def _orthogonalise(a: Array, b: Array) -> tuple[Array, Array]:
     The library's routines start threads even for so few columns, and wait for them longer
     than they compute.
     """
-    rest = np.column_stack([a, b])
-    n = a.shape[1]
-    upper = np.zeros((n, n + 1))
-    for k in range(n):
-        upper[k, k] = np.sqrt(rest[:, k] @ rest[:, k])
-        rest[:, k] /= upper[k, k]
-        upper[k, k + 1 :] = rest[:, k] @ rest[:, k + 1 :]
-        rest[:, k + 1 :] -= rest[:, k, None] * upper[k, k + 1 :]
-    return upper[:, :n], upper[:, n]
+    upper = np.empty((a.shape[1], a.shape[1] + 1))
+    kernels.orthogonalise(np.column_stack([a, b]), upper)
+    return upper[:, :-1], upper[:, -1]
 
 
 def _inverted(upper: Array) -> Array:
