@@ -262,7 +262,7 @@ class DeformationSettings:
         3.0, "Smallest depth", "Shallower deviations are not reported.", unit="mm", minimum=0.1
     )
     significance: float = setting(
-        5.0,
+        5.5,
         "Significance",
         "A deviation counts if it is this many times its own noise.",
         minimum=2.0,

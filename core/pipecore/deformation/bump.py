@@ -250,18 +250,25 @@ def _fit(
             *((p[3:5] - extent_log) / EXTENT_PRIOR),
             (p[3] - p[4]) / ROUNDNESS_PRIOR,
             p[5] / max(contour_sd, 1e-5),
-            np.log(q) / form.prior,
+            (p[6] if len(p) > 6 else 0.0) / form.prior,
         ]
         return np.concatenate([(deviation - model) / noise, np.asarray(beliefs)])
 
     scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
+
+    def jacobian(p: Array) -> Array:
+        # Steps by what matters of each parameter: relative ones vanish where it is near zero.
+        here = residuals(p)
+        steps = np.diag(1e-3 * scale)
+        return np.stack([(residuals(p + s) - here) / s.sum() for s in steps], axis=1)
+
     answer = least_squares(
         residuals,
         first,
+        jacobian,
         method="lm",
         x_scale=scale,
-        diff_step=1e-5,
-        max_nfev=400,
+        max_nfev=60,
         ftol=1e-5,
         xtol=1e-5,
     )

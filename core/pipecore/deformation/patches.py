@@ -27,7 +27,7 @@ MIN_POINTS = 8
 RETURN = 0.4
 """Beyond a bump, the surface is back if it is closer to the contour than this share of it."""
 
-BULGE_FACTOR = 1.2
+BULGE_FACTOR = 1.1
 """A bulge has to be this much more significant than a dent: what touches a pipe looks like one."""
 
 MAX_MISFIT = 1.8
