@@ -146,6 +146,11 @@ class Overlay(QWidget):
             return
         area, ground = self.rect(), tuple(taken)
         pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
+        # A label must not cover what another one points at.
+        spots = [
+            QRectF(x - 8, y - 8, 16, 16) if np.isfinite(x) and np.isfinite(y) else QRectF()
+            for x, y in pixels
+        ]
         order = sorted(range(len(self.labels)), key=lambda i: not self.labels[i].is_selected)
         marks = []
         for i in order:
@@ -157,7 +162,12 @@ class Overlay(QWidget):
             width = painter.fontMetrics().horizontalAdvance(label.text) + ICON + 3 * SPACING
             # The selected one is looked at: its label must not cover it.
             leader = 2.5 * LEADER if label.is_selected else LEADER
-            box = place_box(anchor, QSize(width, 3 * SPACING), area, taken, leader)
+            others = [spot for k, spot in enumerate(spots) if k != i]
+            size = QSize(width, 3 * SPACING)
+            # Where it is crowded, better over another's spot than not at all.
+            box = place_box(anchor, size, area, [*taken, *others], leader) or place_box(
+                anchor, size, area, taken, leader
+            )
             marks.append((anchor, box, label))
             self._targets.append((QRectF(anchor.x() - 7, anchor.y() - 7, 14, 14), i))
             if box is not None:
