@@ -47,6 +47,7 @@ HINTS = {
 """Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
+NO_LIMIT = 2**31
 COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 
 
@@ -92,6 +93,7 @@ class SceneView(QWidget):
         self.canvas.left.connect(self._stop_hovering)
         self.canvas.before_frame.connect(self._prepare_frame)
         self.canvas.drawn.connect(self.points.learn)
+        self.canvas.drawn.connect(self._preview.learn)
         self.setAccessibleName("3D view")
         self._warming = threading.Thread(target=warm_up, name="warm up picking", daemon=True)
         self._warming.start()
@@ -236,6 +238,8 @@ class SceneView(QWidget):
 
     def _prepare_frame(self) -> None:
         canvas, projection = self.canvas, self.canvas.projection()
+        if not canvas.is_software:
+            self.points.most = NO_LIMIT
         self.points.show(
             seconds=canvas.seconds_to_draw,
             pixel_size=projection.pixel_size(canvas.pose.distance),
@@ -266,6 +270,7 @@ class SceneView(QWidget):
         if handle < 0:
             return None
         visible = visible_points(state.cloud, state.result, state.view.hidden_elements)
+        self._preview.seconds_per_point = self.points.seconds_per_point
         self._preview.set_points(state.cloud, visible, self._colour)
         self._preview.clip(box)
 

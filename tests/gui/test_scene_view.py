@@ -179,7 +179,7 @@ def test_that_fewer_points_are_drawn_while_moving_and_all_at_rest(qtbot, no_leak
     view.apply(scene_state(cloud=cloud, result=result))
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
-    view.points._seconds_per_point = 1e-5  # as on a slow machine
+    view.points.seconds_per_point = 1e-5  # as on a slow machine
     with qtbot.waitSignal(view.canvas.drawn):
         view.set_standard_view("top")
     assert view.points.n_shown < 60_000
