@@ -21,6 +21,7 @@ from pipegui.worker import (
     Event,
     Failed,
     Finished,
+    Glimpsed,
     JobProgress,
     Progressed,
     Started,
@@ -39,7 +40,7 @@ def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointClo
     """Read a scan with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
-    return read(path, length_unit=settings.input.length_unit, progress=progress)
+    return read(path, length_unit=settings.input.length_unit, progress=progress, look=progress.look)
 
 
 def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -> Result:
@@ -91,6 +92,8 @@ class Jobs(QObject):
     started = Signal(str)
     progressed = Signal(object)
     """A `Progressed` event."""
+    glimpsed = Signal(object)
+    """A part of the cloud that is being read."""
     cancelling = Signal()
     ended = Signal()
     cancelled = Signal(str)
@@ -214,6 +217,8 @@ class Jobs(QObject):
                 self.started.emit(event.title)
             case Progressed() if self.is_busy:
                 self.progressed.emit(event)
+            case Glimpsed():
+                self.glimpsed.emit(event.part)
             case Finished() | Failed() | Cancelled():
                 self._end(event)
 

@@ -98,6 +98,18 @@ class MainWindow(QMainWindow):
         if self.document.scan is not None:
             self.jobs.detect(self.document.scan.cloud, self.document.settings)
 
+    def show_glimpse(self, part: PointCloud) -> None:
+        """Show what was read so far, unless another scan is looked at."""
+        if self.document.scan is None:
+            self.centre.setCurrentWidget(self.parts.scene)
+            self.parts.scene.glimpse(part)
+
+    def end_glimpse(self) -> None:
+        """What was read comes as a scan now, or not at all."""
+        self.parts.scene.end_glimpse()
+        if self.document.scan is None:
+            self.centre.setCurrentWidget(self.panels.welcome)
+
     def take_scan(self, scan: Scan) -> None:
         """Add a scan that was read."""
         self.panels.message.hide()

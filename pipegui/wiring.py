@@ -189,6 +189,8 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.started.connect(status.start)
     jobs.progressed.connect(status.progress)
     jobs.cancelling.connect(status.show_cancelling)
+    jobs.glimpsed.connect(window.show_glimpse)
+    jobs.ended.connect(window.end_glimpse)
     jobs.ended.connect(status.end)
     jobs.busy_changed.connect(lambda _: window.update_actions())
     jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))

@@ -1,5 +1,6 @@
 """What is written over the picture: labels, legend, scale bar, directions."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,10 @@ from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from pipecore.geometry import Array
+from pipecore.report.format import format_measure
+from pipecore.types import Deformation, DeformationKind
 from pipegui import theme
+from pipegui.colours import VERDICT
 from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
@@ -66,6 +70,22 @@ def place_box(
             if QRectF(area).contains(room) and not any(room.intersects(t) for t in taken):
                 return box
     return None
+
+
+def label_of(deformation: Deformation, *, is_selected: bool) -> Label:
+    """Return what is written at a deformation's peak."""
+    if deformation.kind is DeformationKind.OVALITY and math.isfinite(deformation.ovality):
+        size = format_measure(100 * deformation.ovality, unit="%")
+    else:
+        size = format_measure(1000 * deformation.depth, 1000 * deformation.depth_sd, "mm")
+    return Label(
+        deformation.deformation_id,
+        f"{str(deformation.kind).capitalize()} {size}",
+        theme.verdict_icon(deformation.verdict),
+        QColor(VERDICT[deformation.verdict]),
+        np.asarray(deformation.peak, np.float64),
+        is_selected,
+    )
 
 
 class Overlay(QWidget):

@@ -38,6 +38,13 @@ class FakeScene(FakeView):
     def __init__(self) -> None:
         super().__init__()
         self.standard_views: list[str] = []
+        self.glimpses: list[Any] = []
+
+    def glimpse(self, part: Any) -> None:
+        self.glimpses.append(part)
+
+    def end_glimpse(self) -> None:
+        self.glimpses.append(None)
 
     shades_edges = False
 
