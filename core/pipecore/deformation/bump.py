@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipecore._kernels import bumps as kernels
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
@@ -47,8 +48,12 @@ ROUNDNESS_PRIOR = 0.5
 
 @dataclass(frozen=True)
 class Form:
-    """A family of sections: height at ρ given q, and the sd of log q around 0 believed in."""
+    """A family of sections: height at ρ given q, and the sd of log q around 0 believed in.
 
+    `number` is how the kernels name it.
+    """
+
+    number: int
     section: Callable[[Array, float], Array]
     prior: float
 
@@ -205,7 +210,9 @@ def frustum(rho: Array, q: float = 1.0) -> Array:
     return np.asarray(np.clip((1.0 - rho) * (1.0 + q), 0.0, 1.0))
 
 
-BELL, CONE, FRUSTUM = Form(bump_shape, 0.4), Form(cone, 0.4), Form(frustum, 0.7)
+BELL = Form(kernels.BELL, bump_shape, 0.4)
+CONE = Form(kernels.CONE, cone, 0.4)
+FRUSTUM = Form(kernels.FRUSTUM, frustum, 0.7)
 
 
 def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
@@ -237,30 +244,33 @@ def _fit(
 ) -> _Fit:
     form = form or BELL
     along, around, deviation, noise = data
-    extent_log = np.log(TYPICAL_EXTENT * diameter)
     slack = 0.3 * np.exp(first[3:5])
 
-    def residuals(p: Array) -> Array:
-        q = float(np.exp(p[6])) if len(p) > 6 else 1.0
-        u, v = 2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4])
-        model = p[0] * form.section(np.hypot(u, v), q) + p[5]
-        beliefs = [
-            p[0] / (HEIGHT_PRIOR * diameter),
-            *(p[1:3] / slack),
-            *((p[3:5] - extent_log) / EXTENT_PRIOR),
-            (p[3] - p[4]) / ROUNDNESS_PRIOR,
-            p[5] / max(contour_sd, 1e-5),
-            (p[6] if len(p) > 6 else 0.0) / form.prior,
-        ]
-        return np.concatenate([(deviation - model) / noise, np.asarray(beliefs)])
+    n, n_free = len(along), len(first)
+    # Beliefs are residuals too: (slopes · p - middle).
+    slopes = np.zeros((8, n_free))
+    slopes[0, 0] = 1.0 / (HEIGHT_PRIOR * diameter)
+    slopes[[1, 2], [1, 2]] = 1.0 / slack
+    slopes[[3, 4], [3, 4]] = 1.0 / EXTENT_PRIOR
+    slopes[5, 3:5] = 1.0 / ROUNDNESS_PRIOR, -1.0 / ROUNDNESS_PRIOR
+    slopes[6, 5] = 1.0 / max(contour_sd, 1e-5)
+    slopes[7, 6:] = 1.0 / form.prior
+    middle = np.zeros(8)
+    middle[3:5] = np.log(TYPICAL_EXTENT * diameter) / EXTENT_PRIOR
 
-    scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
+    def residuals(p: Array) -> Array:
+        result = np.empty(n + len(slopes))
+        kernels.residuals(form.number, p, along, around, deviation, noise, result[:n])
+        result[n:] = slopes @ p - middle
+        return result
 
     def jacobian(p: Array) -> Array:
-        # Steps by what matters of each parameter: relative ones vanish where it is near zero.
-        here = residuals(p)
-        steps = np.diag(1e-3 * scale)
-        return np.stack([(residuals(p + s) - here) / s.sum() for s in steps], axis=1)
+        result = np.empty((n + len(slopes), n_free))
+        kernels.derivatives(form.number, p, along, around, noise, result[:n])
+        result[n:] = slopes
+        return result
+
+    scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
 
     answer = least_squares(
         residuals,
