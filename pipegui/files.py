@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QSettings, QStandardPaths
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from pipecore.io import file_filter
@@ -76,6 +76,12 @@ def remember(settings: QSettings, path: Path) -> None:
     """Put a scan at the top of the recent ones."""
     paths = [path.resolve(), *(p for p in recent(settings) if p != path.resolve())]
     settings.setValue("files/recent", [str(p) for p in paths[:N_RECENT]])
+
+
+def preset_folder() -> Path:
+    """Return the folder of the settings that the user keeps by name."""
+    place = QStandardPaths.StandardLocation.AppDataLocation
+    return Path(QStandardPaths.writableLocation(place)) / "presets"
 
 
 def _last_folder(settings: QSettings) -> str:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
-from pipegui import commands, describe, edit_commands, view_commands
+from pipegui import commands, describe, edit_commands, files, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
+from pipegui.presets import Presets
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -102,6 +103,10 @@ def connect_panels(window: "MainWindow") -> None:
         lambda keys: window.stored.setValue("table/columns", " ".join(keys))
     )
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
+    panels.settings.keys_reset.connect(lambda keys: do(commands.reset_keys, keys))
+    panels.settings.presets.chosen.connect(lambda settings: do(commands.apply_preset, settings))
+    panels.settings.presets.failed.connect(lambda text: panels.message.tell(text, "error"))
+    panels.settings.presets.use(Presets(files.preset_folder()))
     panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
     panels.stacks.preset_chosen.connect(lambda preset: do(commands.set_preset, preset))
     panels.stacks.added.connect(lambda stack: do(commands.add_stack, stack))

@@ -11,12 +11,12 @@ from pipecore.preview import ProfilePreview
 from pipecore.report.format import cell, format_count
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
+from pipegui.plan_state import PreviewState
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.exaggeration import ellipse_points
 from pipegui.plots.export import Table
 from pipegui.plots.section_view import FAR, STEPS
 from pipegui.section_cut import Ellipse
-from pipegui.view_state import PreviewState
 
 EMPTY = (
     "Open a scan to see one of its profiles with its curves before you detect. "
