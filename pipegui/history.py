@@ -43,6 +43,12 @@ class History:
             self._future.clear()
         self._show(after)
 
+    def reset(self, document: Document) -> None:
+        """Begin anew with another document."""
+        self._past.clear()
+        self._future.clear()
+        self._show(document)
+
     def undo(self) -> None:
         """Go back one step, if there is one."""
         self._move(self._past, self._future)

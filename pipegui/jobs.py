@@ -118,7 +118,7 @@ class Jobs(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._read, self._detect = read, detect
+        self.read, self._detect = read, detect
         self.plan = plan
         self._waiting: deque[_Request] = deque()
         self._glance: _Request | None = None
@@ -136,7 +136,7 @@ class Jobs(QObject):
         for path in paths:
 
             def work(progress: JobProgress, path: Path = path) -> Scan:
-                cloud = self._read(path, settings, progress)
+                cloud = self.read(path, settings, progress)
                 if not len(cloud):
                     raise ReadError(f"“{path.name}” holds no points.")
                 return Scan(path.name, cloud, length_unit=settings.input.length_unit)
@@ -160,6 +160,12 @@ class Jobs(QObject):
             self.edited.emit(Edited(cloud, before, after, text))
 
         self._request(_Request(title, change, done))
+
+    def run(
+        self, title: str, work: Callable[[JobProgress], Any], done: Callable[[Any], None]
+    ) -> None:
+        """Do anything else that takes its time, and hand what it makes to `done`."""
+        self._request(_Request(title, work, done))
 
     def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
         """Write something that takes its time."""

@@ -24,6 +24,9 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
     edits = window.edits
     found: dict[str, Callable[..., object]] = {
         "open": menu.open,
+        "open_project": window.projects.ask_open,
+        "save": window.projects.save,
+        "save_as": window.projects.save_as,
         "close_scan": lambda: do(commands.close_scan, window.document.active),
         "load_settings": menu.load_settings,
         "save_settings": menu.save_settings,
@@ -203,4 +206,7 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.scan_read.connect(window.take_scan)
     jobs.detected.connect(window.take_result)
     jobs.edited.connect(window.edits.take)
+    if (rescue := window.projects.rescue) is not None:
+        jobs.detected.connect(lambda *_: rescue.keep())
+        jobs.edited.connect(lambda _: rescue.keep())
     jobs.written.connect(lambda path: tell(f"Saved “{path}”."))

@@ -1,7 +1,7 @@
 """The 3D view: takes a `SceneState`, shows it, and says what the user points at."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -223,6 +223,20 @@ class SceneView(QWidget):
     def show_selection(self) -> None:
         """Move the camera to what is selected."""
         self._aim(self._state)
+
+    def camera(self) -> dict[str, list[float]]:
+        """Where the camera is, to be kept in a file."""
+        pose = self.canvas.pose
+        return {
+            "focus": pose.focus.tolist(),
+            "look": [pose.distance, pose.heading, pose.elevation],
+        }
+
+    def set_camera(self, camera: Mapping[str, list[float]]) -> None:
+        """Go where the camera was; stay if that is not told."""
+        focus, look = np.array(camera.get("focus", ())), camera.get("look", ())
+        if focus.shape == (3,) and len(look) == 3 and look[0] > 0:
+            self.canvas.fly_to(Pose(focus, *look), fly=False)
 
     def view_direction(self) -> Array:
         """Unit vector in which the camera looks."""

@@ -57,6 +57,12 @@ class FakeScene(FakeView):
     def show_selection(self) -> None:
         self.standard_views.append("selection")
 
+    def camera(self) -> dict[str, list[float]]:
+        return {"focus": [1.0, 2.0, 3.0], "look": [4.0, 0.5, 0.25]}
+
+    def set_camera(self, camera: Any) -> None:
+        self.camera_set = camera
+
     def view_direction(self) -> np.ndarray:
         return np.array([0.0, 0.6, -0.8])
 

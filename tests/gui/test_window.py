@@ -66,7 +66,7 @@ def test_that_after_opening_the_cloud_is_shown_and_detect_is_lit(window, qtbot):
     assert window.parts.scene.isVisible()
     assert window.parts.scene.state.cloud is make_cloud()
     assert window.actions_["detect"].isEnabled()
-    assert window.windowTitle() == "plant.laz – PipeGUI"
+    assert window.windowTitle() == "plant.laz[*] – PipeGUI"
     assert "20 k points" in window.status.scan.text()
 
 
