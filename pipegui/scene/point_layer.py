@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
@@ -215,6 +214,8 @@ def set_planes(actor: vtkActor, box: Box | None) -> None:
 
 def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:
     """Return about how far points are from each other on a surface, metres."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 - takes its time
+
     if len(xyz) < 2:
         return 0.01
     sample = xyz[np.unique(np.random.default_rng(0).integers(0, len(xyz), n_sampled))]
