@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
-from pipegui import commands, describe, edit_commands, files, view_commands
+from pipegui import commands, cuts, describe, edit_commands, files, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
 from pipegui.presets import Presets
@@ -159,11 +159,31 @@ def connect_views(window: "MainWindow") -> None:
     parts.radius_plot.pins_cleared.connect(lambda: do(commands.set_view, pinned_elements=()))
     parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
     parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
+    parts.map.spot_hovered.connect(lambda place: _mark_in_scene(window, place))
+    parts.scene.hovered.connect(lambda i: _mark_on_map(window, i))
     parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
     for plot in (parts.radius_plot, parts.section, parts.map, parts.preview):
         plot.save_requested.connect(
             lambda ending, plot=plot: window.menu_actions.save_plot(plot, ending)
         )
+
+
+def _mark_in_scene(window: "MainWindow", place: tuple[float, float] | None) -> None:
+    """Show in 3D what the cursor is at on the map."""
+    result, element_id = window.document.result, window.document.selection.element_id
+    spot = None
+    if place is not None and result is not None and element_id:
+        spot = cuts.spot_on_surface(result, element_id, *place)
+    window.parts.scene.mark_spot(spot)
+
+
+def _mark_on_map(window: "MainWindow", point_index: int) -> None:
+    """Show on the map what the cursor is at in 3D, if it is on the selected element."""
+    scan, element_id = window.document.scan, window.document.selection.element_id
+    place = None
+    if scan is not None and scan.result is not None:
+        place = cuts.spot_of_point(scan.cloud, scan.result, element_id, point_index)
+    window.parts.map.show_cursor(place)
 
 
 def connect_previews(window: "MainWindow") -> None:

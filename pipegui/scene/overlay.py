@@ -88,6 +88,10 @@ def label_of(deformation: Deformation, *, is_selected: bool) -> Label:
     )
 
 
+SPOT = 9.0
+"""Radius of the ring around another view's cursor, pixels."""
+
+
 class Overlay(QWidget):
     """Lies over the canvas and is transparent to the mouse."""
 
@@ -99,6 +103,8 @@ class Overlay(QWidget):
         self.marks: tuple[MeasureMark, ...] = ()
         self.handles: Array | None = None
         """Of the clip box, local coordinates, shape (n, 3)."""
+        self.spot: Array | None = None
+        """Where another view's cursor is, local coordinates, shape (3,)."""
         self.hint = ""
         """What to do next, at the top."""
         self._crosses: list[tuple[QRectF, int]] = []
@@ -132,6 +138,8 @@ class Overlay(QWidget):
             taken.append(self._draw_legend(painter, self.legend))
         if self.handles is not None:
             self._draw_handles(painter, self._projection, self.handles)
+        if self.spot is not None:
+            self._draw_spot(painter, self._projection, self.spot)
         if self.hint:
             taken.append(self._draw_hint(painter, self.hint))
         accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
@@ -146,6 +154,17 @@ class Overlay(QWidget):
         painter.setBrush(self._tint("base"))
         for x, y in pixels[np.isfinite(pixels).all(axis=1)]:
             painter.drawEllipse(QPointF(x, y), HANDLE, HANDLE)
+
+    def _draw_spot(self, painter: QPainter, projection: Projection, spot: Array) -> None:
+        pixels, _ = projection.to_screen(spot[None])
+        if not np.isfinite(pixels).all():
+            return
+        at = QPointF(*pixels[0].tolist())
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for colour, width in ((self._paper(), 4.0), (self._tint("accent"), 2.0)):
+            painter.setPen(QPen(colour, width))
+            painter.drawEllipse(at, SPOT, SPOT)
+            painter.drawPoint(at)
 
     def _draw_hint(self, painter: QPainter, text: str) -> QRectF:
         metrics = painter.fontMetrics()

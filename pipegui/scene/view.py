@@ -238,6 +238,11 @@ class SceneView(QWidget):
         if focus.shape == (3,) and len(look) == 3 and look[0] > 0:
             self.canvas.fly_to(Pose(focus, *look), fly=False)
 
+    def mark_spot(self, spot: Array | None) -> None:
+        """Show where another view's cursor is, in local coordinates; None for nowhere."""
+        self.overlay.spot = spot
+        self.overlay.update()
+
     def view_direction(self) -> Array:
         """Unit vector in which the camera looks."""
         return self.canvas.pose.forward

@@ -51,6 +51,11 @@ class FakeScene(FakeView):
     def set_standard_view(self, name: str) -> None:
         self.standard_views.append(name)
 
+    spot: Any = None
+
+    def mark_spot(self, spot: Any) -> None:
+        self.spot = spot
+
     def fit(self) -> None:
         self.standard_views.append("fit")
 
@@ -89,7 +94,12 @@ class FakePreview(FakeView):
 
 class FakeMap(FakeView):
     spot_clicked = Signal(float, float)
+    spot_hovered = Signal(object)
     deformation_clicked = Signal(int)
+    cursor: Any = None
+
+    def show_cursor(self, place: Any) -> None:
+        self.cursor = place
 
 
 def make_fake_parts() -> Parts:
