@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.deformation.bump import Bump
-from pipecore.deformation.centre_line import MIN_BOW_RATIO, measure_centre_line
+from pipecore.deformation.centre_line import CENTRE_KNOTS, MIN_BOW_RATIO, measure_centre_line
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
 from pipecore.deformation.patches import Patch, find_patches
@@ -319,7 +319,12 @@ def _measure_bow(
         used &= ~patch.cells(grid, 1.15)
     variance = np.where(used, heights.noise**2 / np.maximum(heights.count, 1), np.inf)
     contour = fit_contour(
-        grid, heights.deviation, variance, n_terms, knot_diameters=1.5, constant_radius=True
+        grid,
+        heights.deviation,
+        variance,
+        n_terms,
+        knot_diameters=CENTRE_KNOTS,
+        constant_radius=True,
     )
     line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
