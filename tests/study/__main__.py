@@ -1,4 +1,4 @@
-"""How accurate the detection is: `python -m tests.study [fits pipes plants one-station deformations pump]`.
+"""How accurate the detection is: `python -m tests.study [SECTION ...]`.
 
 Measures on simulated scans with known truth and writes `docs/accuracy.md`, each section
 apart. What has been measured is kept in out/study for the same sources, so that a run that
