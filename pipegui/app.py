@@ -23,6 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from pipegui.jobs import Jobs  # noqa: PLC0415
     from pipegui.main_window import MainWindow  # noqa: PLC0415
     from pipegui.parts import make_parts  # noqa: PLC0415
+    from pipegui.warming import Warming  # noqa: PLC0415
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
@@ -41,6 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         guard.happened.connect(window.tell_crash)
         guard.install()
         window.show()
+        warming = Warming(stored)
+        warming.started.connect(window.status.start_warming)
+        warming.ended.connect(window.status.end_warming)
+        if not is_shot:
+            warming.start()
         if is_shot:
             from pipegui.screenshot import Screenshot  # noqa: PLC0415
 
@@ -51,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if window.projects.rescue is not None:
             window.projects.rescue.offer()
         code = app.exec()
+        warming.close()
         guard.uninstall()
         window.projects.discard()
         window.close()

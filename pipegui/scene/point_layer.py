@@ -112,8 +112,9 @@ class PointLayer:
         self, cloud: PointCloud, visible: NDArray[np.bool_] | None, colour: ColourRows
     ) -> None:
         """Show the `visible` points (None: all) of a cloud."""
+        is_new = cloud is not self._cloud
         self.clear_actors()
-        if cloud is not self._cloud:
+        if is_new:
             self.spacing = estimate_spacing(cloud.xyz)
         self._cloud, self._colour = cloud, colour
         self._visible = None if visible is None else np.flatnonzero(visible).astype(np.int32)
@@ -169,8 +170,13 @@ class PointLayer:
         for part in self._slices:
             self._renderer.RemoveActor(part.actor)
         self._slices, self.n_shown = [], 0
-        self._cloud = self._visible = self._colour = self._clip = None
+        self._visible = self._colour = self._clip = None
         self._spread = Spread(0)
+
+    def forget(self) -> None:
+        """Let go of the cloud too."""
+        self.clear_actors()
+        self._cloud = None
 
     def _reach(self, limit: float) -> list[_Slice]:
         """Return the slices up to `limit` points, at least the first; make those not there yet."""

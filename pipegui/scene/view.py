@@ -125,7 +125,8 @@ class SceneView(QWidget):
     ) -> None:
         cloud, view = state.cloud, state.view
         if cloud is None:
-            self.points.clear_actors()
+            self.points.forget()
+            self._preview.forget()
             return
         is_new_result = state.result is not before.result
         is_recoloured = (
@@ -390,9 +391,9 @@ class SceneView(QWidget):
         self._hover_timer.stop()
         self._decorations.clear()
         self._frame.show(None, (0.0, 0.0, 0.0))
-        self._preview.clear_actors()
+        self._preview.forget()
         self._glimpse.clear()
-        self.points.clear_actors()
+        self.points.forget()
         self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)
