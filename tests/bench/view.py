@@ -195,8 +195,8 @@ which does not count what else the machine does. Memory is in bytes a
 point: the cloud's own, and with all that the view adds to it, resident after a rest; without
 a graphics card, what that would hold is among it.
 
-| million points | first picture | move, median | move, worst | move, CPU | points moving | points at rest \
-| pick | recolour | clip | drag box, worst | memory: cloud | memory: all |
+| million points | first picture | move, median | move, worst | move, CPU | points moving \
+| points at rest | pick | recolour | clip | drag box, worst | memory: cloud | memory: all |
 | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: | --: |
 {chr(10).join(lines)}
 """
