@@ -64,6 +64,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "Ctrl+Shift+S",
             "scan",
         ),
+        _SEPARATOR,
         _A("close_scan", "Close scan", "Close the active scan", "close", "Ctrl+W", "scan"),
         _SEPARATOR,
         _A("load_settings", "Load settings…", "Take the settings of a TOML file", "tune-variant"),

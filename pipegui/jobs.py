@@ -79,6 +79,7 @@ class _Request:
     work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
     failed: Callable[[str], None] | None = None
+    is_reading: bool = False
 
     @property
     def is_glance(self) -> bool:
@@ -86,7 +87,10 @@ class _Request:
 
 
 class Jobs(QObject):
-    """Runs requests one after the other and tells what came of them."""
+    """Runs requests one after the other and tells what came of them.
+
+    Scans that are opened while something else runs are read beside it.
+    """
 
     busy_changed = Signal(bool)
     started = Signal(str)
@@ -100,6 +104,9 @@ class Jobs(QObject):
     """Title of the job."""
     failed = Signal(str, str)
     """Message, and details for a bug report."""
+
+    beside = Signal(str)
+    """What is read beside the running job; "" for no more."""
 
     scan_read = Signal(object)
     """A `Scan`."""
@@ -122,6 +129,7 @@ class Jobs(QObject):
         self.plan = plan
         self._waiting: deque[_Request] = deque()
         self._glance: _Request | None = None
+        self._beside: Jobs | None = None
         self._running: _Request | None = None
         self.worker = Worker(self)
         self.worker.happened.connect(self._take)
@@ -132,7 +140,8 @@ class Jobs(QObject):
         return self._running is not None and not self._running.is_glance
 
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
-        """Read each file as a scan of its own."""
+        """Read each file as a scan of its own, without waiting for a detection."""
+        lane = self if self._running is None or self._running.is_reading else self._side_lane()
         for path in paths:
 
             def work(progress: JobProgress, path: Path = path) -> Scan:
@@ -141,7 +150,19 @@ class Jobs(QObject):
                     raise ReadError(f"“{path.name}” holds no points.")
                 return Scan(path.name, cloud, length_unit=settings.input.length_unit)
 
-            self._request(_Request(f"Reading {path.name}", work, self.scan_read.emit))
+            title = f"Reading {path.name}"
+            lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))
+
+    def _side_lane(self) -> "Jobs":
+        if self._running is not None and self._running.is_glance:
+            return self  # it makes way
+        if self._beside is None:
+            self._beside = Jobs(parent=self)
+            self._beside.started.connect(self.beside)
+            self._beside.ended.connect(lambda: self.beside.emit(""))
+            self._beside.cancelled.connect(self.cancelled)
+            self._beside.failed.connect(self.failed)
+        return self._beside
 
     def detect(self, cloud: PointCloud, settings: Settings) -> None:
         """Detect on a cloud."""
@@ -190,6 +211,8 @@ class Jobs(QObject):
     def cancel(self) -> None:
         """Stop what runs, and forget what waits."""
         self._waiting.clear()
+        if self._beside is not None:
+            self._beside.cancel()
         if self._running is not None:
             if self.is_busy:
                 self.cancelling.emit()
@@ -198,6 +221,8 @@ class Jobs(QObject):
     def close(self) -> None:
         """Stop everything and wait for the worker's thread."""
         self._waiting.clear()
+        if self._beside is not None:
+            self._beside.close()
         self.worker.happened.disconnect(self._take)
         self.worker.close()
 

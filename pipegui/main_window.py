@@ -135,7 +135,10 @@ class MainWindow(QMainWindow):
         seconds = sum(result.seconds.values())
         took = f" Detected in {seconds:.0f} s." if seconds >= 1 else ""
         severity = "info" if result.elements else "warning"
-        self.panels.message.tell(f"{summarise(result)}{hint}.{took}", severity)
+        # Another scan may be looked at meanwhile.
+        scan = next((s for s in self.document.scans if s.cloud is cloud), None)
+        whose = f"{scan.name}: " if scan is not None and scan is not self.document.scan else ""
+        self.panels.message.tell(f"{whose}{summarise(result)}{hint}.{took}", severity)
 
     def choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
         """Select what was chosen in the tree, in another scan if it is there."""

@@ -122,7 +122,12 @@ class Projects(QObject):
         if not self.has_unsaved_work:
             go_on()
             return
-        box = self._question("Save the work before it is closed?", "It would be lost otherwise.")
+        scan = self.document.scan
+        name = self.path.stem if self.path is not None else scan.name if scan is not None else ""
+        box = self._question(
+            f"Save the work on “{name}”?",
+            "What was detected, edited and reviewed since the last save would be lost.",
+        )
         box.setStandardButtons(Button.Save | Button.Discard | Button.Cancel)
         box.setDefaultButton(Button.Save)
 

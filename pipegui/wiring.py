@@ -220,6 +220,7 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.glimpsed.connect(window.show_glimpse)
     jobs.ended.connect(window.end_glimpse)
     jobs.ended.connect(status.end)
+    jobs.beside.connect(status.show_beside)
     jobs.busy_changed.connect(lambda _: window.update_actions())
     jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))
     jobs.failed.connect(lambda message, details: tell(message, "error", details))

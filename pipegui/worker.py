@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -181,7 +182,10 @@ class Worker(QObject):
     def _run(self) -> None:
         while (item := self._jobs.get()) is not None:
             progress, job, work = item
-            self._posted.emit(_end_of(progress, job, work))
+            ended = _end_of(progress, job, work)
+            # Who closed does not wait for ever: nobody may be there to hear of the end.
+            with suppress(RuntimeError):
+                self._posted.emit(ended)
 
     @Slot(object)
     def _deliver(self, event: Event) -> None:

@@ -89,6 +89,13 @@ class StatusBar(QStatusBar):
             f"{self.job.text().split(' · ')[0]} · working (the first run takes longer)"
         )
 
+    def show_beside(self, title: str) -> None:
+        """Show what goes on beside the running job."""
+        if title:
+            self.showMessage(f"{title}…")
+        else:
+            self.clearMessage()
+
     def show_cancelling(self) -> None:
         """Answer a cancel at once, before the work has stopped."""
         if self._job_box.isVisible():

@@ -384,3 +384,64 @@ def test_that_nothing_is_kept_while_there_is_nothing_to_lose(make, qtbot, laz, t
     assert not window.projects.rescue.path.exists()
     assert np.isfinite(window.document.scan.cloud.xyz).all()
     assert window.document.settings == Document().settings
+
+
+# A second scan meanwhile
+
+
+def test_that_another_scan_is_opened_looked_at_and_closed_while_one_is_detected(
+    make_window, qtbot, laz, tmp_path
+):
+    go, other = threading.Event(), tmp_path / "other.laz"
+    write_laz(other, make_scan(N + 100)[0])
+
+    def slow(cloud, settings, progress):
+        while not go.wait(0.01):
+            progress.update("ellipses", 0.5)
+        return detect(cloud, settings, progress)
+
+    window = make_window(read=read_file, detect=slow)
+    window.open_files([laz])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    window.open_files([other])
+    qtbot.waitUntil(lambda: len(window.document.scans) == 2)
+    assert window.jobs.is_busy
+    assert "Detecting" in window.status.job.text()
+    assert window.document.active == 1
+    assert len(window.parts.scene.state.cloud) == N + 100
+    # Back to the first by a click in the tree, and to the other with the keyboard.
+    tree = window.panels.tree
+    for row in (0, 1):
+        index = tree.model.index(row, 0)
+        tree.view.scrollTo(index)
+        place = tree.view.visualRect(index).center()
+        qtbot.mouseClick(tree.view.viewport(), Qt.MouseButton.LeftButton, pos=place)
+        assert window.document.active == row
+    go.set()
+    qtbot.waitUntil(lambda: window.document.scans[0].result is not None)
+    assert window.document.active == 1
+    assert window.document.result is None
+    assert window.panels.message.text.text().startswith("plant.laz: ")
+
+
+def test_that_a_scan_that_cannot_be_read_beside_a_detection_is_told(
+    make_window, qtbot, laz, tmp_path
+):
+    go = threading.Event()
+
+    def slow(cloud, settings, progress):
+        while not go.wait(0.01):
+            progress.update("ellipses", 0.5)
+        return detect(cloud, settings, progress)
+
+    window = make_window(read=read_file, detect=slow)
+    window.open_files([laz])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    window.open_files([tmp_path / "none.laz"])
+    qtbot.waitUntil(lambda: "none.laz" in window.panels.message.text.text())
+    assert window.jobs.is_busy
+    assert not window.status.currentMessage()
+    go.set()
+    qtbot.waitUntil(lambda: window.document.result is not None)
