@@ -3,6 +3,7 @@
 import math
 import os
 import platform
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -113,7 +114,18 @@ as many threads as each takes of itself. None of them measures deformations.
             )
         }
 """
-    PAGE.write_text(text, encoding="utf-8")
+    PAGE.write_text(f"{text}\n{_other_parts()}", encoding="utf-8")
+
+
+def _other_parts() -> str:
+    """What other benches have written into the page, between their marks."""
+    old = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+    marked = re.findall(r"<!-- (\w+): begin -->.*?<!-- \1: end -->\n?", old, re.DOTALL)
+    return "\n".join(
+        old[old.index(f"<!-- {name}: begin -->") : old.index(end) + len(end) + 1]
+        for name in marked
+        for end in [f"<!-- {name}: end -->"]
+    )
 
 
 def _growth(lines: Sequence[Line]) -> str:
