@@ -56,15 +56,19 @@ def measure_elements(
     fit: EllipseFit,
     progress: Progress,
     others: tuple[Element, ...] = (),
+    per_point: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
 ) -> Measurement:
     """Measure every element on all points around it.
 
     `others` are not measured, but what touches an element there is no deformation of it.
+    `per_point` are arrays to take for the measurement's, full of `NO_ID` and nan.
     """
     everything = built.elements + others
     boxes = _boxes(everything)
-    element_id = np.full(n_points, NO_ID, np.int32)
-    deviation = np.full(n_points, np.nan, np.float32)
+    element_id, deviation = per_point or (
+        np.full(n_points, NO_ID, np.int32),
+        np.full(n_points, np.nan, np.float32),
+    )
     measured: list[_Measured] = []
     n = len(built.elements)
     for start in range(0, n, AT_ONCE):

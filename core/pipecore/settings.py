@@ -262,7 +262,7 @@ class DeformationSettings:
         3.0, "Smallest depth", "Shallower deviations are not reported.", unit="mm", minimum=0.1
     )
     significance: float = setting(
-        5.5,
+        6.0,
         "Significance",
         "A deviation counts if it is this many times its own noise.",
         minimum=2.0,
@@ -281,18 +281,42 @@ class DeformationSettings:
         zero_means="not known",
     )
     rule: str = setting(
-        "asme-6pct",
-        "Acceptance rule",
-        "The rule that judges each deformation: the name of one that comes with the program, "
-        "or the path of your own .toml file.",
+        "asme-6pct", "Acceptance rule", "The rule that judges each deformation, by its file name."
     )
-    mesh_exaggeration: float = setting(
+
+
+@dataclass(frozen=True)
+class TilingSettings:
+    """Scans that do not fit into memory."""
+
+    memory_gib: float = setting(
         0.0,
-        "Mesh of deformations",
-        "Reports have deformations.ply: dented surfaces, deviations this many times larger.",
+        "Memory limit",
+        "Scans that would take more are processed in tiles, with the same result.",
+        unit="GiB",
         minimum=0.0,
-        maximum=100.0,
-        zero_means="no mesh",
+        zero_means="two thirds of the free memory",
+    )
+    tile_mpoints: float = setting(
+        0.0,
+        "Tile size",
+        "Millions of thinned points that are processed together.",
+        minimum=0.0,
+        zero_means="as the memory limit allows",
+        advanced=True,
+    )
+    scheduler: str = setting(
+        "",
+        "Dask scheduler",
+        "Address of a dask.distributed scheduler whose workers process the tiles, such as "
+        "“tcp://10.0.0.5:8786”; empty: this computer.",
+        advanced=True,
+    )
+    folder: str = setting(
+        "",
+        "Temporary folder",
+        "Where tiles are kept meanwhile; workers elsewhere must share it. Empty: beside the "
+        "report.",
         advanced=True,
     )
 
@@ -314,6 +338,7 @@ class Settings:
     ellipses: EllipseSettings = EllipseSettings()
     elements: ElementSettings = ElementSettings()
     deformation: DeformationSettings = DeformationSettings()
+    tiling: TilingSettings = TilingSettings()
 
     def __post_init__(self) -> None:
         """Check every value."""

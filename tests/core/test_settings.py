@@ -180,7 +180,7 @@ def test_that_a_form_can_show_every_setting(key: str) -> None:
     assert spec.label[0].isupper()
     assert spec.help.endswith(".")
     assert spec.default == Settings().get(key)
-    suffixes = {"_mm": "mm", "_deg": "°", "_pct": "%"}
+    suffixes = {"_mm": "mm", "_deg": "°", "_pct": "%", "_gib": "GiB"}
     units = {unit for suffix, unit in suffixes.items() if spec.name.endswith(suffix)}
     assert units == ({spec.unit} if spec.unit else set())
     if spec.zero_means:

@@ -19,3 +19,10 @@ def flatten(parents):
     """Point every element at its root."""
     for i in range(parents.shape[0]):
         parents[i] = find_root(parents, i)
+
+
+@njit(cache=True, nogil=True)
+def count_members(roots, sizes):
+    """Add the number of elements that point at each root."""
+    for root in roots:
+        sizes[root] += 1

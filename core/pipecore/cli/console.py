@@ -99,6 +99,12 @@ class Console:
         if not self._is_quiet:
             print(text, flush=True)
 
+    def note(self, text: str) -> None:
+        """Print a word on what is being done on standard error."""
+        self._end_stage(is_done=True)
+        if not self._is_quiet:
+            print(text, file=sys.stderr, flush=True)
+
     def complain(self, text: str) -> None:
         """Print an error as one line on standard error."""
         self._end_stage(is_done=False)

@@ -1,6 +1,8 @@
 """``pipecore detect``."""
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +16,8 @@ from pipecore.report import by_verdict, summarise, write_report
 from pipecore.report.format import format_clock, format_measure
 from pipecore.rules import load_rule, outside_diameter
 from pipecore.settings import Settings
-from pipecore.types import Result
+from pipecore.tiling import GIB, detect_in_tiles, estimate_need
+from pipecore.types import PointCloud, Result
 
 
 def run(args: argparse.Namespace, console: Console) -> None:
@@ -27,14 +30,32 @@ def run(args: argparse.Namespace, console: Console) -> None:
     if args.threads:
         parallel.set_threads(args.threads)
 
-    cloud = io.read(args.inputs, length_unit=settings.input.length_unit, progress=console)
-    result = detect(cloud, settings, console)
-    write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
+    with _detected(args, settings, console) as (cloud, result):
+        write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
 
     console.say(f"{summarise(result)}.")
     for line in deformation_lines(result):
         console.say(line)
     console.say(f"Report: {args.output / 'report.html'}")
+
+
+@contextmanager
+def _detected(
+    args: argparse.Namespace, settings: Settings, console: Console
+) -> Iterator[tuple[PointCloud, Result]]:
+    """Read and detect, in tiles if the scan is larger than the memory it may take."""
+    need = estimate_need(args.inputs, settings.tiling)
+    if need.is_too_large:
+        console.note(
+            f"{need.n_points:,} points would take about {need.bytes_in_one_piece / GIB:.1f} GiB; "
+            f"the limit is {need.limit / GIB:.1f} GiB, so they are processed in tiles."
+        )
+        beside = args.output.absolute().parent
+        with detect_in_tiles(args.inputs, settings, console, beside) as found:
+            yield found
+        return
+    cloud = io.read(args.inputs, length_unit=settings.input.length_unit, progress=console)
+    yield cloud, detect(cloud, settings, console)
 
 
 def _check_output(directory: Path, overwrite: bool) -> None:

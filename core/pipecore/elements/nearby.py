@@ -58,12 +58,28 @@ def _in_order_met(
 
 
 class NearbyPoints:
-    """Looks up thinned points around an axis, and the cloud's points behind them."""
+    """Looks up thinned points around an axis, and the cloud's points behind them.
 
-    def __init__(self, cloud: PointCloud, surface: Surface) -> None:
+    Parameters
+    ----------
+    cloud : PointCloud
+    surface : Surface
+    behind : (ndarray, ndarray), optional
+        The cloud's points in the order of their thinned points, and where those of each
+        begin, if known; by default found from `surface.parent`.
+    """
+
+    def __init__(
+        self,
+        cloud: PointCloud,
+        surface: Surface,
+        behind: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
+    ) -> None:
         self._cloud = cloud
         self.surface = surface
-        self._members, self._starts = group_by_label(surface.parent, len(surface.xyz))
+        self._members: NDArray[np.int64]
+        self._starts: NDArray[np.int64]
+        self._members, self._starts = behind or group_by_label(surface.parent, len(surface.xyz))
         edge = CELL_VOXELS * surface.voxel
         frame = GridFrame.of(surface.xyz, edge)
         first, _, n_y, n_z = frame.numbers

@@ -9,6 +9,7 @@ Importing this package imports none of the libraries that read the formats.
 """
 
 from pipecore.io.atomic import write_directory, write_file
+from pipecore.io.mapped import reserve
 from pipecore.io.reading import read
 from pipecore.io.registry import Format, file_filter, formats, identify
 from pipecore.io.summary import FileInfo, info
@@ -22,6 +23,7 @@ __all__ = [
     "identify",
     "info",
     "read",
+    "reserve",
     "write_directory",
     "write_file",
     "write_laz",

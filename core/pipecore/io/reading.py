@@ -1,15 +1,16 @@
 """From the chunks of one or several files to one cloud in one local frame."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.errors import ReadError
+from pipecore.io.mapped import MappedFile
 from pipecore.io.registry import identify
-from pipecore.io.source import Chunk, Source
+from pipecore.io.source import CHUNK_POINTS, Chunk, Source
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import LengthUnit
 from pipecore.types import Array, PointCloud
@@ -19,9 +20,6 @@ ORIGIN_STEP = 100.0
 
 FLOAT32_REACH = 1024.0
 """Up to this far from the local zero a float32 is within 0.03 mm, metres."""
-
-LOOK_POINTS = 10_000
-"""About so many points of a chunk are shown before all are read."""
 
 FARTHEST = 1e9
 """Coordinates beyond this (metres) lie off any map; they count as invalid, like nan."""
@@ -33,8 +31,8 @@ def read(
     paths: Paths,
     *,
     length_unit: LengthUnit = LengthUnit.METRE,
+    folder: Path | None = None,
     progress: Progress | None = None,
-    look: Callable[[PointCloud], None] | None = None,
 ) -> PointCloud:
     """Read one point cloud from one or several files.
 
@@ -50,11 +48,11 @@ def read(
         Unit of the coordinates in the files. Local coordinates are metres whatever it
         is, and `cloud.world(local)` gives *metres* in the files' coordinate system:
         divide by `length_unit.metres` to get the files' own numbers.
+    folder : Path, optional
+        Where to keep the points if they are more than memory holds: the cloud's arrays are
+        then files in this folder, mapped into memory.
     progress : Progress, optional
         Told about the stage "reading"; may cancel.
-    look : callable, optional
-        Given a few points of every chunk as soon as it is read, evenly spread over it, as
-        a cloud with the origin of the whole: for showing what comes.
 
     Returns
     -------
@@ -75,16 +73,13 @@ def read(
     recognised = [identify(path) for path in files]
     sizes = np.array([path.stat().st_size for path in files], dtype=np.float64)
     starts = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-    cloud = _GrowingCloud(length_unit.metres)
+    cloud = _GrowingCloud(length_unit.metres, folder)
     for i, path in enumerate(files):
         with recognised[i].open(path) as source:
             before = cloud.n_points
             cloud.begin_file(source, int(sizes[i]))
             for chunk in source.chunks:
-                start = cloud.n_points
                 cloud.add(chunk)
-                if look is not None and cloud.n_points > start:
-                    look(cloud.part(start, LOOK_POINTS))
                 done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
                 progress.update("reading", min(float(done), 1.0))
             if cloud.n_points == before:
@@ -103,10 +98,14 @@ def _as_paths(paths: Paths) -> list[Path]:
 class _Column:
     """An array that grows in place; rows that are never set stay zero."""
 
-    def __init__(self, dtype: type, width: int | None = None) -> None:
+    def __init__(self, dtype: type, width: int | None = None, path: Path | None = None) -> None:
+        self._file = MappedFile(path, dtype, width) if path else None
         self.array: NDArray[np.generic] = np.zeros((0,) if width is None else (0, width), dtype)
 
     def resize(self, n_rows: int) -> None:
+        if self._file is not None:
+            self.array = self._file.resized(n_rows)
+            return
         # In place (no second copy in memory); nothing else refers to the array yet.
         self.array.resize((n_rows, *self.array.shape[1:]), refcheck=False)
 
@@ -120,11 +119,12 @@ class _Column:
 class _GrowingCloud:
     """A cloud to which chunks are added, never held twice in memory."""
 
-    def __init__(self, metres_per_unit: float) -> None:
+    def __init__(self, metres_per_unit: float, folder: Path | None = None) -> None:
+        self._folder = folder
         self.metres_per_unit = metres_per_unit
         self.n_points = 0
         self.origin: Array | None = None
-        self.xyz = _Column(np.float32, 3)
+        self.xyz = self._column("xyz", np.float32, 3)
         self.intensity: _Column | None = None
         self.rgb: _Column | None = None
         self.classification: _Column | None = None
@@ -132,6 +132,22 @@ class _GrowingCloud:
         self.crs = ""
         self.file_start = 0
         self.has_wide_colours = False
+
+    def _column(self, name: str, dtype: type, width: int | None = None) -> _Column:
+        path = self._folder and self._folder / f"{name}.{np.dtype(dtype).name}"
+        return _Column(dtype, width, path)
+
+    def _widen_coordinates(self) -> None:
+        """Go over to float64."""
+        if self._folder is None:
+            self.xyz.array = self.xyz.array.astype(np.float64)
+            return
+        narrow, self.xyz = self.xyz.array, self._column("xyz", np.float64, 3)
+        self.xyz.resize(len(narrow))
+        for start in range(0, self.n_points, CHUNK_POINTS):
+            rows = slice(start, min(start + CHUNK_POINTS, self.n_points))
+            self.xyz.put(start, narrow[rows])
+        (self._folder / "xyz.float32").unlink()
 
     def begin_file(self, source: Source, file_size: int) -> None:
         """Take over what a source knows besides its points."""
@@ -158,16 +174,16 @@ class _GrowingCloud:
             self.origin = np.round(np.median(xyz, axis=0) / ORIGIN_STEP) * ORIGIN_STEP + 0.0
         local = xyz - self.origin
         if self.xyz.array.dtype == np.float32 and np.abs(local).max() > FLOAT32_REACH:
-            self.xyz.array = self.xyz.array.astype(np.float64)
+            self._widen_coordinates()
         self.xyz.put(self.n_points, local)
         if chunk.intensity is not None:
-            self.intensity = self.intensity or _Column(np.float32)
+            self.intensity = self.intensity or self._column("intensity", np.float32)
             self.intensity.put(self.n_points, chunk.intensity[keep])
         if chunk.rgb is not None:
-            self.rgb = self.rgb or _Column(np.uint8, 3)
+            self.rgb = self.rgb or self._column("rgb", np.uint8, 3)
             self.rgb.put(self.n_points, self._eight_bits(chunk.rgb[keep]))
         if chunk.classification is not None:
-            self.classification = self.classification or _Column(np.uint8)
+            self.classification = self.classification or self._column("classification", np.uint8)
             self.classification.put(self.n_points, chunk.classification[keep])
         self.n_points += len(local)
 
@@ -182,16 +198,6 @@ class _GrowingCloud:
         if not self.has_wide_colours:
             return rgb.astype(np.uint8)
         return (rgb >> 8).astype(np.uint8)
-
-    def part(self, start: int, n_points: int) -> PointCloud:
-        """Return about so many of the points from `start` on, copied."""
-        assert self.origin is not None
-        rows = slice(start, self.n_points, max(1, (self.n_points - start) // n_points))
-        return PointCloud(
-            origin=self.origin,
-            xyz=self.xyz.array[rows].copy(),  # type: ignore[arg-type]
-            rgb=None if self.rgb is None else self.rgb.array[rows].copy(),  # type: ignore[arg-type]
-        )
 
     def finish(self, source: Path) -> PointCloud:
         """Return the cloud; nothing can be added after that."""

@@ -24,6 +24,7 @@ def write_laz(
     cloud: PointCloud,
     extra: Mapping[str, NDArray[Any]] | None = None,
     *,
+    factors: Mapping[str, float] | None = None,
     length_unit: LengthUnit = LengthUnit.METRE,
     progress: Progress | None = None,
 ) -> None:
@@ -37,6 +38,8 @@ def write_laz(
     extra : mapping of str to ndarray, optional
         More values of each point, integer, boolean or floating, shape (n,), by a name of
         up to 32 characters.
+    factors : mapping of str to float, optional
+        What some of the extra values are multiplied by when they are written.
     length_unit : LengthUnit
         Unit of the coordinates written.
     progress : Progress, optional
@@ -93,7 +96,8 @@ def write_laz(
             if cloud.classification is not None:
                 points["classification"] = cloud.classification[rows]
             for name, values in extra.items():
-                points[name] = _storable(values[rows])
+                factor = (factors or {}).get(name)
+                points[name] = _storable(values[rows] if factor is None else factor * values[rows])
             writer.write_points(points)
 
 
@@ -110,7 +114,12 @@ class _LasIntensity:
         if values is None or not len(values):
             return
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        if low < 0 or high > 65535 or (values % 1 != 0).any():
+        blocks = range(0, len(values), CHUNK_POINTS)
+        if (
+            low < 0
+            or high > 65535
+            or any((values[b : b + CHUNK_POINTS] % 1 != 0).any() for b in blocks)
+        ):
             self.low = low
             self.factor = 65535 / (high - low) if high > low else 0.0
 

@@ -1,5 +1,6 @@
 """Stacks: the cloud cut into parallel profiles, in several directions (paper, section 3.1)."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from pipecore.errors import SettingsError
 from pipecore.geometry import unit
 from pipecore.progress import Progress
 from pipecore.settings import DirectionPreset, StackSettings
-from pipecore.stacks.directions import AXES, DIAGONALS, automatic_directions
+from pipecore.stacks.directions import AXES, DIAGONALS, automatic_directions, local_axes
 from pipecore.surface import Surface
 from pipecore.types import Stack
 
@@ -35,11 +36,22 @@ def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
 
 
 def choose_stacks(
-    surface: Surface, settings: StackSettings, progress: Progress
+    surface: Surface,
+    settings: StackSettings,
+    progress: Progress,
+    find_axes: Callable[[Surface, Progress], NDArray[np.float64]] = local_axes,
 ) -> tuple[Stack, ...]:
     """Return the stacks that the settings ask for: the preset's, then the user's own.
 
     Those of automatic width come again with wide profiles, for thinly scanned places.
+
+    Parameters
+    ----------
+    surface : Surface
+    settings : StackSettings
+    progress : Progress
+    find_axes : callable
+        Gives the local axes of the surface, of which automatic directions are made.
 
     Raises
     ------
@@ -49,7 +61,7 @@ def choose_stacks(
     width = settings.width_mm / 1e3 or WIDTH * surface.voxel
     named: list[tuple[str, ArrayLike, float]] = []
     if settings.preset is DirectionPreset.AUTOMATIC:
-        found = automatic_directions(surface, progress)
+        found = automatic_directions(find_axes(surface, progress))
         named += [(f"auto {i}", d, width) for i, d in enumerate(found, start=1)]
     else:
         named += [(describe_direction(d), d, width) for d in preset_directions(settings.preset)]

@@ -97,12 +97,12 @@ def cover_directions(axes: Array) -> list[Array]:
     return chosen
 
 
-def automatic_directions(surface: Surface, progress: Progress) -> list[Array]:
+def automatic_directions(axes: Array) -> list[Array]:
     """Directions along which the cloud's own surfaces run, most frequent first.
 
-    Where the cloud shows no curved surface, the axes and diagonals.
+    Where the cloud shows no curved surface and so no local axes, the axes and diagonals.
     """
-    chosen = cover_directions(local_axes(surface, progress))
+    chosen = cover_directions(axes)
     return chosen or [*AXES, *DIAGONALS]
 
 

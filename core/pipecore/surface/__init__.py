@@ -9,14 +9,17 @@ from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
-from pipecore.surface.grid import CellGrid
+from pipecore.surface.grid import CellGrid, cells_of
 from pipecore.surface.spacing import median_spacing
-from pipecore.surface.thinning import ThinnedCloud, thin
+from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
 from pipecore.types import PointCloud
 
 __all__ = [
+    "SMALLEST_VOXEL",
     "Surface",
     "ThinnedCloud",
+    "average_voxels",
+    "cells_of",
     "estimate_normals",
     "fit_planes",
     "median_spacing",
@@ -88,7 +91,7 @@ def fit_planes(
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_planes(
-            xyz, *grid.rows, radius, MIN_NEIGHBOURS, start, stop, grid.order,
+            xyz, *grid.lookup, radius, MIN_NEIGHBOURS, start, stop, grid.order,
             normals, residuals, spacing,
         )  # fmt: skip
 

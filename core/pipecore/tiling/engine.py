@@ -1,0 +1,146 @@
+"""Tiles on dask: threads of this process by default, any cluster by its address."""
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from pipecore import parallel
+from pipecore.errors import CancelledError, PipecoreError, SettingsError
+from pipecore.progress import Progress
+from pipecore.tiling.store import Store, check_access
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 0.2
+"""Progress is reported, and cancelling noticed, at least this often, seconds."""
+_CONNECT_TIMEOUT = "5s"
+
+
+class Engine:
+    """Runs the same work on many tiles.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    store : Store
+    n_at_once : int
+        Tiles that share one computer's memory at a time.
+    """
+
+    def __init__(self, client: "Client", store: Store, n_at_once: int) -> None:
+        self._client = client
+        self.store = store
+        self.n_at_once = n_at_once
+
+    def run(
+        self,
+        work: Callable[..., Any],
+        tiles: Sequence[tuple[Any, ...]],
+        stage: str,
+        progress: Progress,
+        span: tuple[float, float] = (0.0, 1.0),
+    ) -> list[Any]:
+        """Call `work(store, *tile)` for every tile and return the results in their order.
+
+        What a tile returns must be small; what is large it writes to the store.
+
+        Raises
+        ------
+        CancelledError
+            From `progress`; tiles that have begun end soon.
+        PipecoreError
+            From a tile, or if a worker is lost.
+        """
+        from distributed import wait  # noqa: PLC0415
+        from distributed.scheduler import KilledWorker  # noqa: PLC0415
+
+        begin, end = span
+        progress.update(stage, begin)
+        futures = [self._client.submit(work, self.store, *tile, pure=False) for tile in tiles]
+        pending = set(futures)
+        try:
+            while pending:
+                try:
+                    done, pending = wait(pending, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+                except TimeoutError:
+                    done = set()
+                for future in done:
+                    if future.status == "error":
+                        future.result()
+                share = 1.0 - len(pending) / max(len(futures), 1)
+                progress.update(stage, begin + (end - begin) * share)
+            return [future.result() for future in futures]
+        except KilledWorker as error:
+            raise PipecoreError(
+                "A worker of the dask cluster was lost, most likely for want of memory; lower "
+                "the memory limit (tiling.memory_gib) to make tiles smaller."
+            ) from error
+        except BaseException:
+            self.store.give_up()
+            self._client.cancel(futures)
+            raise
+
+
+@contextmanager
+def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
+    """Connect to a scheduler, or start threads of this process if `scheduler` is "".
+
+    Raises
+    ------
+    SettingsError
+        If the scheduler does not answer, has no workers, or they cannot use the store.
+    """
+    import dask  # noqa: PLC0415
+    from distributed import Client, LocalCluster  # noqa: PLC0415
+
+    for name in ("distributed", "distributed.worker", "distributed.scheduler"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    with dask.config.set({"distributed.comm.timeouts.connect": _CONNECT_TIMEOUT}):
+        if not scheduler:
+            n_threads = parallel.threads()
+            with (
+                LocalCluster(
+                    n_workers=1,
+                    threads_per_worker=n_threads,
+                    processes=False,
+                    dashboard_address=None,
+                    memory_limit=None,
+                ) as cluster,
+                Client(cluster) as client,
+            ):
+                yield Engine(client, store, n_threads)
+            return
+        try:
+            client = Client(scheduler, timeout=_CONNECT_TIMEOUT)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise SettingsError(
+                f"No dask scheduler answers at “{scheduler}” (tiling.scheduler)."
+            ) from error
+        with client:
+            yield Engine(client, store, _check_workers(client, scheduler, store))
+
+
+def _check_workers(client: "Client", scheduler: str, store: Store) -> int:
+    """Make sure that all workers can use the store; return the most threads on one computer."""
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    if not workers:
+        raise SettingsError(f"The dask scheduler at “{scheduler}” has no workers.")
+    try:
+        can_use = client.run(check_access, store)
+    except CancelledError:
+        raise
+    except Exception as error:
+        raise SettingsError(
+            f"The workers of “{scheduler}” cannot run pipecore; install the same version there."
+        ) from error
+    if not all(can_use.values()):
+        raise SettingsError(
+            f"The workers of “{scheduler}” cannot use “{store.folder.parent}”; choose a folder "
+            "that all of them share (tiling.folder)."
+        )
+    threads: dict[str, int] = {}
+    for worker in workers.values():
+        threads[worker["host"]] = threads.get(worker["host"], 0) + worker["nthreads"]
+    return max(threads.values())

@@ -1,0 +1,75 @@
+"""How much memory a detection takes in one piece, and how large tiles may be."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipecore.io import identify
+from pipecore.settings import TilingSettings
+
+GIB = 2**30
+
+ONE_PIECE_BYTES = 400
+"""A detection in one piece takes about this much a point: measured, see docs/performance.md."""
+BASE_BYTES = 400 * 2**20
+"""The program itself with its libraries and compiled kernels."""
+KEPT_BYTES = 8
+"""What a point costs whatever the tiles: tables of cells, flags, lists of elements' points."""
+TEXT_BYTES = 25
+"""A point takes at least about this much in a file that does not tell how many it holds."""
+SHARE_OF_FREE = 2 / 3
+SMALLEST_TILE = 32 * 2**20
+"""Tiles of less memory than this cost more than they save."""
+
+
+@dataclass(frozen=True)
+class Need:
+    """What a detection needs and may have.
+
+    Parameters
+    ----------
+    n_points : int
+        As the files' headers say, or as their sizes suggest.
+    bytes_in_one_piece : int
+    limit : int
+        Bytes.
+    """
+
+    n_points: int
+    bytes_in_one_piece: int
+    limit: int
+
+    @property
+    def is_too_large(self) -> bool:
+        """Whether the cloud has to be processed in tiles."""
+        return self.bytes_in_one_piece > self.limit
+
+
+def estimate_need(paths: Sequence[Path], settings: TilingSettings) -> Need:
+    """Compare what the detection in one piece would take with the memory limit.
+
+    Raises
+    ------
+    ReadError
+        If a file cannot be read.
+    """
+    n_points = 0
+    for path in paths:
+        with identify(path).open(path) as source:
+            n_points += source.n_points or path.stat().st_size // TEXT_BYTES
+    limit = int(settings.memory_gib * GIB) or int(SHARE_OF_FREE * free_memory())
+    return Need(n_points, BASE_BYTES + ONE_PIECE_BYTES * n_points, limit)
+
+
+def free_memory() -> int:
+    """Bytes of memory that the computer has free."""
+    import psutil  # noqa: PLC0415
+
+    return int(psutil.virtual_memory().available)
+
+
+def tile_bytes(n_points: int, limit: int, n_at_once: int) -> int:
+    """Memory that one of several tiles may take beside what is always there."""
+    left = limit - BASE_BYTES - KEPT_BYTES * n_points
+    return max(SMALLEST_TILE, math.floor(left / n_at_once))
