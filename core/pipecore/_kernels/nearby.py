@@ -207,30 +207,24 @@ def points_on_sphere(xyz, normals, is_free, members, starts, cells, centre, inne
 @njit(cache=True, nogil=True)
 def points_on(
     xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
-    kind, surface, band, depth, min_cos,
+    kind, surface, band, min_cos,
 ):  # fmt: skip
-    """Free points of some cells that lie on a surface about an axis, and what lies inside it.
+    """Free points of some cells that lie on a surface about an axis.
 
-    Points count whose normals are like the surface's own (cosine above `min_cos`), between
-    two distances from the axis: those within `band` of the surface are on it, those deeper
-    than `depth` inside. Of the former returns, in the order of their indices, the indices and
-    (n, 4): distance, chainage, clock, and the angle from the surface's normal to the point's
-    own towards increasing clock. Of the latter chainage and clock (m, 2).
+    That are points within `band` of it, between two distances from the axis, with normals
+    like its own (cosine above `min_cos`). Returns, in the order of their indices, the indices
+    and (n, 4): distance, chainage, clock, and the angle from the surface's normal to the
+    point's own towards increasing clock.
     """
-    n_most = 0
-    for c in cells:
-        n_most += starts[c + 1] - starts[c]
-    found, table = np.empty(n_most, np.int64), np.empty((n_most, 4))
-    inside = np.empty((n_most, 2))
+    found, table = np.empty(256, np.int64), np.empty((256, 4))
     row = np.empty(MOST_PARAMETERS)
-    n = n_inside = 0
+    n = 0
     for c in cells:
         for m in range(starts[c], starts[c + 1]):
             i = members[m]
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
-            is_on = abs(residual) < band and is_free[i]
-            if not (is_on or residual < -depth):
+            if not abs(residual) < band or not is_free[i]:
                 continue
             cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
             if not abs(cosine) > min_cos:
@@ -239,22 +233,52 @@ def points_on(
             rho, clock = polar(up, right)
             if not (inner < rho < outer and -margin < chainage < axis[16] + margin):
                 continue
-            if residual < -depth:
-                inside[n_inside, 0], inside[n_inside, 1] = chainage, clock
-                n_inside += 1
-            if is_on:
-                tx, ty, tz = tangent(axis, chainage)
-                ahead = (
-                    normals[i, 0] * (ty * oz - tz * oy)
-                    + normals[i, 1] * (tz * ox - tx * oz)
-                    + normals[i, 2] * (tx * oy - ty * ox)
-                )
-                found[n] = i
-                table[n, 0], table[n, 1], table[n, 2] = residual, chainage, clock
-                table[n, 3] = math.atan(ahead / cosine)
-                n += 1
+            tx, ty, tz = tangent(axis, chainage)
+            ahead = (
+                normals[i, 0] * (ty * oz - tz * oy)
+                + normals[i, 1] * (tz * ox - tx * oz)
+                + normals[i, 2] * (tx * oy - ty * ox)
+            )
+            if n == table.shape[0]:
+                longer = np.empty((2 * n, 4))
+                longer[:n] = table
+                table = longer
+            found = appended(found, n, i)
+            table[n, 0], table[n, 1], table[n, 2] = residual, chainage, clock
+            table[n, 3] = math.atan(ahead / cosine)
+            n += 1
     order = np.argsort(found[:n])
-    return found[:n][order], table[:n][order], inside[:n_inside]
+    return found[:n][order], table[:n][order]
+
+
+@njit(cache=True, nogil=True)
+def points_inside(
+    xyz, normals, members, starts, cells, axis, inner, outer, margin, kind, surface, depth, min_cos
+):
+    """Chainage and clock (m, 2) of points deeper than `depth` inside a surface, as `points_on`."""
+    table = np.empty((256, 2))
+    row = np.empty(MOST_PARAMETERS)
+    n = 0
+    for c in cells:
+        for m in range(starts[c], starts[c + 1]):
+            i = members[m]
+            x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
+            if not residual < -depth:
+                continue
+            cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
+            if not abs(cosine) > min_cos:
+                continue
+            chainage, up, right = across_axis(axis, x, y, z)
+            rho, clock = polar(up, right)
+            if inner < rho < outer and -margin < chainage < axis[16] + margin:
+                if n == table.shape[0]:
+                    longer = np.empty((2 * n, 2))
+                    longer[:n] = table
+                    table = longer
+                table[n, 0], table[n, 1] = chainage, clock
+                n += 1
+    return table[:n]
 
 
 @njit(cache=True, nogil=True)

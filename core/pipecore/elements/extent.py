@@ -1,5 +1,6 @@
 """How far a surface reaches along its axis, and whether its section is round."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +56,7 @@ def find_extent(
     clock: Array,
     residual: Array,
     lean: Array,
-    inside: tuple[Array, Array],
+    inside: Iterable[Array],
     length: float,
     radius: float,
     spacing: float,
@@ -76,8 +77,9 @@ def find_extent(
         Of the points near the surface.
     lean : ndarray, shape (n,)
         Angle from the surface's normal to each point's own, towards increasing clock.
-    inside : tuple of ndarray, each of shape (m,)
-        Chainage and clock of points well inside the surface that face as it does.
+    inside : iterable of two ndarrays, each of shape (m,)
+        Chainage and clock of points well inside the surface that face as it does. Asked for
+        only where there are gaps.
     length : float
         The proposed extent is chainage 0 … `length`.
     radius, spacing, sigma : float
@@ -115,9 +117,13 @@ def find_extent(
     if not is_covered[is_core].any():
         return None
     longest_gap = max(MAX_GAP * radius, MAX_GAP_LENGTH)
-    seen_inside = _seen_by_row(*inside, base, step, n_rows).cumsum(axis=0)
-    in_gaps = seen_inside[covered[1:] - 1] > seen_inside[covered[:-1]]
-    arc_in_gaps = in_gaps.sum(axis=1) * (2 * np.pi / MAX_SECTORS)
+    arc_in_gaps = np.zeros(len(covered) - 1)
+    if (np.diff(covered) > 1).any():
+        chainage_inside, clock_inside = inside
+        seen_inside = _seen_by_row(chainage_inside, clock_inside, base, step, n_rows)
+        total = seen_inside.cumsum(axis=0)
+        in_gaps = total[covered[1:] - 1] > total[covered[:-1]]
+        arc_in_gaps = in_gaps.sum(axis=1) * (2 * np.pi / MAX_SECTORS)
     ends = (np.diff(covered) * step > longest_gap) | (arc_in_gaps > MIN_NARROWER_ARC)
     parts = np.split(covered, np.flatnonzero(ends) + 1)
     part = max(parts, key=lambda p: int(is_core[p].sum()))

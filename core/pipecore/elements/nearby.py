@@ -1,5 +1,6 @@
 """All points of the full cloud around an axis."""
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,8 +35,7 @@ class PointsOn:
     residual, chainage, clock, lean : ndarray, shape (n,)
         Distance from the surface, pipe coordinates, and the angle from the surface's normal
         to the point's own, towards increasing clock.
-    inside : tuple of ndarray, each of shape (m,)
-        Chainage and clock of points well inside the surface that face as it does.
+    inside : PointsInside
     """
 
     own: Indices
@@ -43,7 +43,20 @@ class PointsOn:
     chainage: Array
     clock: Array
     lean: Array
-    inside: tuple[Array, Array]
+    inside: "PointsInside"
+
+
+class PointsInside:
+    """Chainage and clock of points well inside a surface that face as it does.
+
+    They are looked up when they are asked for: seldom.
+    """
+
+    def __init__(self, look_up: Callable[[], Array]) -> None:
+        self._look_up = look_up
+
+    def __iter__(self) -> Iterator[Array]:
+        return iter(self._look_up().T)
 
 
 def _in_order_met(
@@ -129,6 +142,7 @@ class NearbyPoints:
         ----------
         model : SurfaceModel
         axis : Axis
+            Its own.
         margin : float
             How far beyond the axis's ends points are looked for, metres.
         is_free : ndarray of bool
@@ -139,13 +153,28 @@ class NearbyPoints:
             Least cosine between a point's normal and the surface's.
         """
         inner, outer = INNER * model.radius, OUTER * model.radius
-        cells = kernels.cells_around(*self._grid, axis.numbers, inner, outer, margin)
-        own, table, inside = kernels.points_on(
-            self.surface.xyz, self.surface.normals, is_free, *self._cells, cells, axis.numbers,
-            inner, outer, margin, model.kind, model.numbers(), band, depth, min_cos,
+        numbers, shape = axis.numbers, (model.kind, model.numbers())
+        points = self.surface.xyz, self.surface.normals
+        # Only in a shell about the surface, which for a cone is not about one distance.
+        shell = inner, outer
+        if not model.is_conical:
+            shell = max(inner, model.radius - band), min(outer, model.radius + band)
+        cells = kernels.cells_around(*self._grid, numbers, *shell, margin)
+        own, table = kernels.points_on(
+            *points, is_free, *self._cells, cells, numbers, inner, outer, margin,
+            *shape, band, min_cos,
         )  # fmt: skip
         residual, chainage, clock, lean = np.ascontiguousarray(table.T)
-        return PointsOn(own, residual, chainage, clock, lean, (inside[:, 0], inside[:, 1]))
+
+        def look_inside() -> Array:
+            cells = kernels.cells_around(*self._grid, numbers, inner, outer, margin)
+            found: Array = kernels.points_inside(
+                *points, *self._cells, cells, numbers, inner, outer, margin,
+                *shape, depth, min_cos,
+            )  # fmt: skip
+            return found
+
+        return PointsOn(own, residual, chainage, clock, lean, PointsInside(look_inside))
 
     def on_sphere(
         self, model: SphereSurface, is_free: NDArray[np.bool_], *, band: float, min_cos: float

@@ -39,6 +39,11 @@ class SurfaceModel(Protocol):
         """Its kind as the kernels name it."""
         ...
 
+    @property
+    def is_conical(self) -> bool:
+        """Whether its radius changes along its axis."""
+        ...
+
     def numbers(self) -> Array:
         """The surface as the kernels take it, shape (14,)."""
         ...
@@ -89,6 +94,11 @@ class LineSurface(_Measured):
     radius_parameter: ClassVar[int] = 4
 
     @property
+    def is_conical(self) -> bool:
+        """Whether it is a cone."""
+        return self.is_tapered
+
+    @property
     def kind(self) -> int:
         """Cone or cylinder."""
         return kernels.CONE if self.is_tapered else kernels.CYLINDER
@@ -132,6 +142,7 @@ class ArcSurface(_Measured):
 
     radius_parameter: ClassVar[int] = 6
     kind: ClassVar[int] = kernels.TORUS
+    is_conical: ClassVar[bool] = False
 
     @property
     def position(self) -> Array:
@@ -163,6 +174,7 @@ class SphereSurface(_Measured):
 
     radius_parameter: ClassVar[int] = 3
     kind: ClassVar[int] = kernels.SPHERE
+    is_conical: ClassVar[bool] = False
 
     @property
     def position(self) -> Array:

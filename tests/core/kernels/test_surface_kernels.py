@@ -219,8 +219,8 @@ def test_that_points_on_a_surface_are_told_from_those_inside(rng, which):
     assert_allclose(found.lean, np.arctan(ahead / cosine[on]), atol=1e-9)
     inside = like & (residual < -0.02)
     assert inside.any()
-    assert_allclose(np.sort(found.inside[0]), np.sort(chainage[inside]), atol=1e-12)
-    assert_allclose(np.sort(found.inside[1]), np.sort(clock[inside]), atol=1e-12)
+    for one, other in zip(found.inside, (chainage, clock), strict=True):
+        assert_allclose(np.sort(one), np.sort(other[inside]), atol=1e-12)
 
 
 def test_that_points_behind_thinned_ones_are_in_the_order_of_their_places(rng):
