@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.axes import across_axis, polar
+from pipecore._kernels.grouping import argsort_keys
 from pipecore._kernels.surfaces import MOST_PARAMETERS, at_point
 from pipecore._kernels.voxels import EMPTY, slot_of
 
@@ -165,7 +166,8 @@ def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
             ):  # fmt: skip
                 found[n] = i
                 n += 1
-    return np.sort(found[:n])
+    found = found[:n]
+    return found[argsort_keys(found)]
 
 
 @njit(cache=True, nogil=True)
@@ -180,7 +182,8 @@ def points_in_ball(xyz, members, starts, cells, place, radius):
             if x * x + y * y + z * z <= radius * radius:
                 found = appended(found, n, i)
                 n += 1
-    return np.sort(found[:n])
+    found = found[:n]
+    return found[argsort_keys(found)]
 
 
 @njit(cache=True, nogil=True)
@@ -201,7 +204,8 @@ def points_on_sphere(xyz, normals, is_free, members, starts, cells, centre, inne
             if abs(cosine) > min_cos:
                 found = appended(found, n, i)
                 n += 1
-    return np.sort(found[:n])
+    found = found[:n]
+    return found[argsort_keys(found)]
 
 
 @njit(cache=True, nogil=True)
@@ -247,7 +251,7 @@ def points_on(
             table[n, 0], table[n, 1], table[n, 2] = residual, chainage, clock
             table[n, 3] = math.atan(ahead / cosine)
             n += 1
-    order = np.argsort(found[:n])
+    order = argsort_keys(found[:n])
     return found[:n][order], table[:n][order]
 
 

@@ -44,8 +44,6 @@ MAX_MISFIT, MAX_NOISE_MISFIT = 0.015, 0.35
 """Largest root mean square by which a section leaves circle and oval, in radii and in noise."""
 MAX_SPHERE_MISFIT = 0.001
 """The same for spheres, over patches of the surface: vessel heads are flatter on top."""
-ROUGH = 1.5
-"""Slack for pieces whose last round of fitting is still to come."""
 MIN_TAPER_CHANGE = 0.06
 """A cone's radius changes at least by this share."""
 MIN_LENGTH = 0.35
@@ -200,7 +198,7 @@ class _Keeper:
             piece,
             self._nearby,
             usable,
-            lambda rough: is_credible(rough, self._nearby, self._settings, ROUGH),
+            lambda rough, slack: is_credible(rough, self._nearby, self._settings, slack),
             used,
         )
 

@@ -42,6 +42,8 @@ INSIDE = 0.1
 MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
 N_ROUNDS = 3
+ROUGH, VERY_ROUGH = 1.5, 3.0
+"""Slack for pieces whose last round of fitting is still to come, or whose last two are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def refine_piece(
     piece: Piece,
     nearby: NearbyPoints,
     is_free: Flags,
-    is_promising: Callable[[Fitted], bool] = lambda fitted: True,
+    is_promising: Callable[[Fitted, float], bool] = lambda fitted, slack: True,
     used: list[Indices] | None = None,
 ) -> Fitted | None:
     """Fit a piece's surface to the cloud's points and find how far it reaches.
@@ -107,7 +109,9 @@ def refine_piece(
     is_free : ndarray of bool
         Thinned points that no other element has taken.
     is_promising : callable
-        Asked before the last round, which alone uses all points: most pieces end there.
+        Asked, with a slack for the limits of what later rounds can mend, before the last
+        round, which alone uses all points: most pieces end there. Of spheres already after
+        the first round.
     used : list, optional
         The free points that had a say are added to it.
 
@@ -125,7 +129,7 @@ def refine_piece(
     fitted = None
     for round_ in range(N_ROUNDS):
         is_final = round_ == N_ROUNDS - 1
-        if is_final and not (fitted and is_promising(fitted)):
+        if is_final and not (fitted and is_promising(fitted, ROUGH)):
             return None
         margin = _margin(axis, model.radius, round_)
         near = nearby.on_surface(
@@ -248,14 +252,14 @@ def _refine_sphere(
     model: SphereSurface,
     nearby: NearbyPoints,
     is_free: Flags,
-    is_promising: Callable[[Fitted], bool],
+    is_promising: Callable[[Fitted, float], bool],
     used: list[Indices],
 ) -> Fitted | None:
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     fitted = None
     for round_ in range(N_ROUNDS):
         is_final = round_ == N_ROUNDS - 1
-        if is_final and not (fitted and is_promising(fitted)):
+        if is_final and not (fitted and is_promising(fitted, ROUGH)):
             return None
         own = nearby.on_sphere(model, is_free, band=_band(sigma), min_cos=RADIAL_COS)
         used.append(own)
@@ -264,8 +268,9 @@ def _refine_sphere(
             return None
         model = fit.model
         sigma = max(fit.sigma, 0.0005)
-        if round_ > 0:
-            fitted = _fitted_sphere(fit, own, nearby)
+        fitted = _fitted_sphere(fit, own, nearby)
+        if round_ == 0 and not is_promising(fitted, VERY_ROUGH):
+            return None
     return fitted
 
 
