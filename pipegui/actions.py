@@ -47,6 +47,24 @@ def _background(background: Background) -> ActionSpec:
 MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     "File": (
         _A("open", "Open…", "Open laser scans", "folder-open-outline", "Ctrl+O"),
+        _A("open_project", "Open project…", "Open saved work", "", "Ctrl+Shift+O"),
+        _A(
+            "save",
+            "Save project",
+            "Keep results, edits, reviews and settings in one file",
+            "content-save-outline",
+            "Ctrl+S",
+            "scan",
+        ),
+        _A(
+            "save_as",
+            "Save project as…",
+            "Keep the work as another file",
+            "",
+            "Ctrl+Shift+S",
+            "scan",
+        ),
+        _SEPARATOR,
         _A("close_scan", "Close scan", "Close the active scan", "close", "Ctrl+W", "scan"),
         _SEPARATOR,
         _A("load_settings", "Load settings…", "Take the settings of a TOML file", "tune-variant"),

@@ -19,9 +19,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
     from pipegui import theme  # noqa: PLC0415
+    from pipegui.crash_guard import CrashGuard  # noqa: PLC0415
     from pipegui.jobs import Jobs  # noqa: PLC0415
     from pipegui.main_window import MainWindow  # noqa: PLC0415
     from pipegui.parts import make_parts  # noqa: PLC0415
+    from pipegui.warming import Warming  # noqa: PLC0415
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
@@ -35,8 +37,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         is_shot = options.screenshot is not None
         ini = QSettings.Format.IniFormat
         stored = QSettings(f"{scratch}/layout.ini", ini) if is_shot else QSettings()
-        window = MainWindow(make_parts(), Jobs(), stored)
+        window = MainWindow(make_parts(), Jobs(), stored, None if is_shot else _rescue_folder())
+        guard = CrashGuard(window)
+        guard.happened.connect(window.tell_crash)
+        guard.install()
         window.show()
+        warming = Warming(stored)
+        warming.started.connect(window.status.start_warming)
+        warming.ended.connect(window.status.end_warming)
+        if not is_shot:
+            warming.start()
         if is_shot:
             from pipegui.screenshot import Screenshot  # noqa: PLC0415
 
@@ -44,10 +54,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         elif options.detect:
             window.jobs.scan_read.connect(lambda _: window.detect())
         window.open_files(options.files)
+        if window.projects.rescue is not None:
+            window.projects.rescue.offer()
         code = app.exec()
+        warming.close()
+        guard.uninstall()
+        window.projects.discard()
         window.close()
         window.deleteLater()
         return code
+
+
+def _rescue_folder() -> Path:
+    from PySide6.QtCore import QStandardPaths  # noqa: PLC0415
+
+    data = QStandardPaths.StandardLocation.AppDataLocation
+    return Path(QStandardPaths.writableLocation(data)) / "unsaved"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -13,7 +13,7 @@ import numpy as np
 from pipecore.report.summary import by_verdict
 from pipecore.settings import DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
-from pipegui import selecting
+from pipegui import presets, selecting
 from pipegui.document import (
     ColourBy,
     Document,
@@ -263,6 +263,19 @@ def reset_settings(document: Document) -> Document:
     """Back to the defaults, own stacks excepted."""
     stacks = {"stacks.directions": document.settings.stacks.directions}
     return replace(document, settings=Settings().replace(stacks))
+
+
+@step("Reset settings")
+def reset_keys(document: Document, keys: Iterable[str]) -> Document:
+    """Set some settings back to their defaults, by dotted key."""
+    defaults = Settings()
+    return change_settings(document, {key: defaults.get(key) for key in keys})
+
+
+@step("Preset")
+def apply_preset(document: Document, settings: Settings) -> Document:
+    """Take the settings of a preset; what belongs to the scan stays."""
+    return replace(document, settings=presets.applied(document.settings, settings))
 
 
 @step("Load settings")

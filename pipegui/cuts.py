@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.errors import SettingsError
-from pipecore.geometry import Array
+from pipecore.geometry import Array, surface_points
 from pipecore.rules import Measure, Rule, load_rule, outside_diameter
 from pipecore.types import (
     OWN_STACK,
@@ -147,3 +147,21 @@ def points_of_profile(cloud: PointCloud, result: Result, element_id: int, key: P
     # A stack's plane may cut a bend twice: only the branch of this profile counts.
     near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
     return xyz[inside & near].astype(np.float64)
+
+
+def spot_on_surface(result: Result, element_id: int, chainage: float, clock: float) -> Array:
+    """Local coordinates of a spot of an element's undeformed surface, shape (3,)."""
+    element = result.element(element_id)
+    radius = float(element.radius_at(chainage))
+    return np.asarray(surface_points(element.axis, [chainage], [radius], [clock])[0])
+
+
+def spot_of_point(
+    cloud: PointCloud, result: Result, element_id: int, point_index: int
+) -> tuple[float, float] | None:
+    """Chainage and clock of a point of the cloud on an element, None if it is not on it."""
+    if not element_id or point_index < 0 or int(result.element_id[point_index]) != element_id:
+        return None
+    xyz = cloud.xyz[point_index : point_index + 1].astype(np.float64)
+    chainage, _, clock = result.element(element_id).axis.pipe_coordinates(xyz)
+    return float(chainage[0]), float(clock[0])

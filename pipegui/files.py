@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
-from PySide6.QtCore import QSettings
+from PySide6.QtCore import QSettings, QStandardPaths
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from pipecore.io import file_filter
+from pipegui.project_file import SUFFIX
 
 N_RECENT = 10
 
@@ -19,6 +20,25 @@ def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
     if paths:
         settings.setValue("files/folder", str(paths[0].parent))
     return paths
+
+
+def ask_scan(parent: QWidget, settings: QSettings, name: str) -> Path | None:
+    """Ask where a scan is."""
+    found, _ = QFileDialog.getOpenFileName(
+        parent, f"Locate “{name}”", _last_folder(settings), file_filter()
+    )
+    return Path(found) if found else None
+
+
+def ask_project(parent: QWidget, settings: QSettings) -> Path | None:
+    """Ask for a project to open."""
+    name, _ = QFileDialog.getOpenFileName(
+        parent, "Open project", _last_folder(settings), f"Projects (*{SUFFIX})"
+    )
+    if not name:
+        return None
+    settings.setValue("files/folder", str(Path(name).parent))
+    return Path(name)
 
 
 def ask_settings(parent: QWidget, settings: QSettings) -> Path | None:
@@ -63,7 +83,7 @@ def _vacant(folder: Path) -> Path:
 
 
 def recent(settings: QSettings) -> list[Path]:
-    """Return the scans opened last that are still there, the latest first."""
+    """Return the scans and projects opened last that are still there, the latest first."""
     stored = settings.value("files/recent", [])
     # A list of one comes back as plain text.
     names = [stored] if isinstance(stored, str) else stored
@@ -73,9 +93,15 @@ def recent(settings: QSettings) -> list[Path]:
 
 
 def remember(settings: QSettings, path: Path) -> None:
-    """Put a scan at the top of the recent ones."""
+    """Put a scan or project at the top of the recent ones."""
     paths = [path.resolve(), *(p for p in recent(settings) if p != path.resolve())]
     settings.setValue("files/recent", [str(p) for p in paths[:N_RECENT]])
+
+
+def preset_folder() -> Path:
+    """Return the folder of the settings that the user keeps by name."""
+    place = QStandardPaths.StandardLocation.AppDataLocation
+    return Path(QStandardPaths.writableLocation(place)) / "presets"
 
 
 def _last_folder(settings: QSettings) -> str:

@@ -16,6 +16,10 @@ class Revision:
     text: str
 
 
+BUDGET_BYTES = 2 << 30
+"""The first steps are forgotten where going back to them holds more memory than this."""
+
+
 class History:
     """Holds the document; `changed` is called with the new one after every change."""
 
@@ -23,7 +27,9 @@ class History:
         self,
         document: Document | None = None,
         changed: Callable[[Document], None] = lambda document: None,
+        budget_bytes: int = BUDGET_BYTES,
     ) -> None:
+        self._budget_bytes = budget_bytes
         self.document = document if document is not None else Document()
         self.changed = changed
         self._past: list[Revision] = []
@@ -41,7 +47,23 @@ class History:
         if text:
             self._past.append(Revision(before, text))
             self._future.clear()
+            while self._past and self._extra_bytes(after) > self._budget_bytes:
+                del self._past[0]
         self._show(after)
+
+    def reset(self, document: Document) -> None:
+        """Begin anew with another document."""
+        self._past.clear()
+        self._future.clear()
+        self._show(document)
+
+    def _extra_bytes(self, present: Document) -> int:
+        """Memory of the arrays by point that only the steps hold."""
+        own = _arrays_of(present)
+        held: dict[int, int] = {}
+        for revision in self._past:
+            held |= _arrays_of(revision.document)
+        return sum(n_bytes for key, n_bytes in held.items() if key not in own)
 
     def undo(self) -> None:
         """Go back one step, if there is one."""
@@ -88,3 +110,13 @@ class History:
     def redo_text(self) -> str:
         """What would be done again, or ""."""
         return self._future[-1].text if self._future else ""
+
+
+def _arrays_of(document: Document) -> dict[int, int]:
+    """Sizes in bytes of a document's arrays by point, by what tells them apart."""
+    arrays = []
+    for scan in document.scans:
+        arrays.append(scan.cloud.xyz)
+        if scan.result is not None:
+            arrays += [scan.result.segment_id, scan.result.element_id, scan.result.deviation]
+    return {id(array): array.nbytes for array in arrays}

@@ -21,6 +21,7 @@ from pipegui.worker import (
     Event,
     Failed,
     Finished,
+    Glimpsed,
     JobProgress,
     Progressed,
     Started,
@@ -39,7 +40,7 @@ def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointClo
     """Read a scan with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
-    return read(path, length_unit=settings.input.length_unit, progress=progress)
+    return read(path, length_unit=settings.input.length_unit, progress=progress, look=progress.look)
 
 
 def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -> Result:
@@ -78,6 +79,7 @@ class _Request:
     work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
     failed: Callable[[str], None] | None = None
+    is_reading: bool = False
 
     @property
     def is_glance(self) -> bool:
@@ -85,18 +87,26 @@ class _Request:
 
 
 class Jobs(QObject):
-    """Runs requests one after the other and tells what came of them."""
+    """Runs requests one after the other and tells what came of them.
+
+    Scans that are opened while something else runs are read beside it.
+    """
 
     busy_changed = Signal(bool)
     started = Signal(str)
     progressed = Signal(object)
     """A `Progressed` event."""
+    glimpsed = Signal(object)
+    """A part of the cloud that is being read."""
     cancelling = Signal()
     ended = Signal()
     cancelled = Signal(str)
     """Title of the job."""
     failed = Signal(str, str)
     """Message, and details for a bug report."""
+
+    beside = Signal(str)
+    """What is read beside the running job; "" for no more."""
 
     scan_read = Signal(object)
     """A `Scan`."""
@@ -115,10 +125,11 @@ class Jobs(QObject):
         parent: QObject | None = None,
     ) -> None:
         super().__init__(parent)
-        self._read, self._detect = read, detect
+        self.read, self._detect = read, detect
         self.plan = plan
         self._waiting: deque[_Request] = deque()
         self._glance: _Request | None = None
+        self._beside: Jobs | None = None
         self._running: _Request | None = None
         self.worker = Worker(self)
         self.worker.happened.connect(self._take)
@@ -129,16 +140,29 @@ class Jobs(QObject):
         return self._running is not None and not self._running.is_glance
 
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
-        """Read each file as a scan of its own."""
+        """Read each file as a scan of its own, without waiting for a detection."""
+        lane = self if self._running is None or self._running.is_reading else self._side_lane()
         for path in paths:
 
             def work(progress: JobProgress, path: Path = path) -> Scan:
-                cloud = self._read(path, settings, progress)
+                cloud = self.read(path, settings, progress)
                 if not len(cloud):
                     raise ReadError(f"“{path.name}” holds no points.")
                 return Scan(path.name, cloud, length_unit=settings.input.length_unit)
 
-            self._request(_Request(f"Reading {path.name}", work, self.scan_read.emit))
+            title = f"Reading {path.name}"
+            lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))
+
+    def _side_lane(self) -> "Jobs":
+        if self._running is not None and self._running.is_glance:
+            return self  # it makes way
+        if self._beside is None:
+            self._beside = Jobs(parent=self)
+            self._beside.started.connect(self.beside)
+            self._beside.ended.connect(lambda: self.beside.emit(""))
+            self._beside.cancelled.connect(self.cancelled)
+            self._beside.failed.connect(self.failed)
+        return self._beside
 
     def detect(self, cloud: PointCloud, settings: Settings) -> None:
         """Detect on a cloud."""
@@ -157,6 +181,12 @@ class Jobs(QObject):
             self.edited.emit(Edited(cloud, before, after, text))
 
         self._request(_Request(title, change, done))
+
+    def run(
+        self, title: str, work: Callable[[JobProgress], Any], done: Callable[[Any], None]
+    ) -> None:
+        """Do anything else that takes its time, and hand what it makes to `done`."""
+        self._request(_Request(title, work, done))
 
     def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
         """Write something that takes its time."""
@@ -181,6 +211,8 @@ class Jobs(QObject):
     def cancel(self) -> None:
         """Stop what runs, and forget what waits."""
         self._waiting.clear()
+        if self._beside is not None:
+            self._beside.cancel()
         if self._running is not None:
             if self.is_busy:
                 self.cancelling.emit()
@@ -189,6 +221,8 @@ class Jobs(QObject):
     def close(self) -> None:
         """Stop everything and wait for the worker's thread."""
         self._waiting.clear()
+        if self._beside is not None:
+            self._beside.close()
         self.worker.happened.disconnect(self._take)
         self.worker.close()
 
@@ -214,6 +248,8 @@ class Jobs(QObject):
                 self.started.emit(event.title)
             case Progressed() if self.is_busy:
                 self.progressed.emit(event)
+            case Glimpsed():
+                self.glimpsed.emit(event.part)
             case Finished() | Failed() | Cancelled():
                 self._end(event)
 

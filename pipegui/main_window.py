@@ -23,6 +23,8 @@ from pipegui.panels.project_tree import NodeKind
 from pipegui.panels.status import StatusBar
 from pipegui.parts import Parts
 from pipegui.previewing import Previews
+from pipegui.project_file import SUFFIX
+from pipegui.projects import Projects
 from pipegui.toolbar import ToolBar
 from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
 
@@ -38,9 +40,13 @@ class MainWindow(QMainWindow):
         Reads and detects.
     stored : QSettings
         Keeps the window's layout and the recent files.
+    rescue : Path, optional
+        Folder for copies of unsaved work.
     """
 
-    def __init__(self, parts: Parts, jobs: Jobs, stored: QSettings) -> None:
+    def __init__(
+        self, parts: Parts, jobs: Jobs, stored: QSettings, rescue: Path | None = None
+    ) -> None:
         super().__init__()
         self.setObjectName("pipegui")
         self.setWindowTitle("PipeGUI")
@@ -55,6 +61,7 @@ class MainWindow(QMainWindow):
         self.previews = Previews(jobs, self)
         self.menu_actions = MenuActions(self)
         self.edits = Edits(self)
+        self.projects = Projects(self, rescue)
         self.actions_ = Actions(self, wiring.handlers(self))
         self.tool_bar = ToolBar(self.actions_)
         self.addToolBar(self.tool_bar)
@@ -87,8 +94,11 @@ class MainWindow(QMainWindow):
     # Work
 
     def open_files(self, paths: list[Path]) -> None:
-        """Read scans in the background."""
-        self.jobs.open_files(paths, self.document.settings)
+        """Read scans in the background; of projects there is one at a time."""
+        projects = [path for path in paths if path.suffix == SUFFIX]
+        if projects:
+            self.projects.open(projects[0])
+        self.jobs.open_files([p for p in paths if p not in projects], self.document.settings)
 
     def detect(self) -> None:
         """Detect on the active scan in the background."""
@@ -97,6 +107,18 @@ class MainWindow(QMainWindow):
             field.clearFocus()
         if self.document.scan is not None:
             self.jobs.detect(self.document.scan.cloud, self.document.settings)
+
+    def show_glimpse(self, part: PointCloud) -> None:
+        """Show what was read so far, unless another scan is looked at."""
+        if self.document.scan is None:
+            self.centre.setCurrentWidget(self.parts.scene)
+            self.parts.scene.glimpse(part)
+
+    def end_glimpse(self) -> None:
+        """What was read comes as a scan now, or not at all."""
+        self.parts.scene.end_glimpse()
+        if self.document.scan is None:
+            self.centre.setCurrentWidget(self.panels.welcome)
 
     def take_scan(self, scan: Scan) -> None:
         """Add a scan that was read."""
@@ -113,7 +135,10 @@ class MainWindow(QMainWindow):
         seconds = sum(result.seconds.values())
         took = f" Detected in {seconds:.0f} s." if seconds >= 1 else ""
         severity = "info" if result.elements else "warning"
-        self.panels.message.tell(f"{summarise(result)}{hint}.{took}", severity)
+        # Another scan may be looked at meanwhile.
+        scan = next((s for s in self.document.scans if s.cloud is cloud), None)
+        whose = f"{scan.name}: " if scan is not None and scan is not self.document.scan else ""
+        self.panels.message.tell(f"{whose}{summarise(result)}{hint}.{took}", severity)
 
     def choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
         """Select what was chosen in the tree, in another scan if it is there."""
@@ -140,10 +165,17 @@ class MainWindow(QMainWindow):
         text = describe.hover_text(scan, point_index)
         QToolTip.showText(QCursor.pos(), text, self.parts.scene)
 
+    def tell_crash(self, message: str, details: str) -> None:
+        """Say that something went wrong that should not have, and keep a copy of the work."""
+        self.panels.message.tell(message, "error", details)
+        if self.projects.rescue is not None:
+            self.projects.rescue.keep()
+
     # States go to the parts
 
     def _show(self, document: Document) -> None:
         self._apply(resolve(document))
+        self.projects.show_title()
 
     def _apply(self, state: ViewState, *, everything: bool = False) -> None:
         before, self._state = self._state, state
@@ -172,7 +204,6 @@ class MainWindow(QMainWindow):
 
     def _apply_window(self, state: WindowState) -> None:
         has_scan = state.scan is not None
-        self.setWindowTitle(f"{state.scan.name} – PipeGUI" if state.scan else "PipeGUI")
         self.centre.setCurrentWidget(self.parts.scene if has_scan else self.panels.welcome)
         self.tool_bar.apply(state)
         self.status.apply(state)
@@ -247,9 +278,13 @@ class MainWindow(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Keep the layout, stop the work, let go of VTK while its context is there."""
+        if not self.projects.may_close():
+            event.ignore()
+            return
         self.stored.setValue("window/geometry", self.saveGeometry())
         self.stored.setValue("window/state", self.saveState(LAYOUT_VERSION))
         QApplication.styleHints().colorSchemeChanged.disconnect(self._change_scheme)
         self.jobs.close()
+        self.projects.close()
         self.parts.scene.close()
         super().closeEvent(event)

@@ -48,7 +48,8 @@ class MenuActions:
         if self._recent_menu is None:
             self._recent_menu = QMenu("Open recent", window)
             file_menu = window.actions_.menus["File"]
-            file_menu.insertMenu(window.actions_["close_scan"], self._recent_menu)
+            file_menu.insertMenu(window.actions_["save"], self._recent_menu)
+            file_menu.insertSeparator(window.actions_["save"])
         self._recent_menu.clear()
         paths = files.recent(window.stored)
         self._recent_menu.setEnabled(bool(paths))

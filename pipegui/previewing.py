@@ -13,7 +13,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from pipecore.settings import Settings
 from pipecore.types import PointCloud
 from pipegui.jobs import Jobs
-from pipegui.view_state import PlanState, PreviewState
+from pipegui.plan_state import PlanState, PreviewState
 
 if TYPE_CHECKING:
     from pipecore.preview import Plan, ProfilePreview

@@ -5,12 +5,15 @@ and v to 12:00.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipecore.deformation.section_curve import SectionCurve, fit_section
 from pipecore.geometry import Array, twelve_o_clock
 from pipecore.types import Element, Profiles
+
+if TYPE_CHECKING:
+    from pipecore.deformation.section_curve import SectionCurve
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class SectionCut:
     fitted: Ellipse
     reference: Ellipse
     nominal: Ellipse | None = None
-    curve: SectionCurve | None = None
+    curve: "SectionCurve | None" = None
     no_curve: str = ""
 
 
@@ -90,6 +93,9 @@ def cut_section(element: Element, profile: Profiles, xyz: Array) -> SectionCut:
     )
     points_uv = in_plane(xyz)
     u, v = (points_uv - (axis_u, axis_v)).T
+    # With its kernels, which the start of the window should not wait for.
+    from pipecore.deformation.section_curve import SectionCurve, fit_section  # noqa: PLC0415
+
     curve = fit_section(np.arctan2(u, v), np.hypot(u, v) / 1000)
     nominal = None
     if element.nominal is not None:

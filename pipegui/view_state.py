@@ -9,7 +9,7 @@ Nothing here knows Qt or VTK.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +37,8 @@ from pipegui.document import (
     Selection,
     ViewOptions,
 )
+from pipegui.plan_state import PlanningState
 from pipegui.section_cut import SectionCut, cut_section
-
-if TYPE_CHECKING:
-    from pipecore.preview import Plan, ProfilePreview
 
 Array = NDArray[np.float64]
 
@@ -201,33 +199,6 @@ class StacksState:
     shown_stack: int = NO_ID
     measured: Measurement | None = None
     """The last distance that was measured: two points give a direction."""
-
-
-@dataclass(frozen=True)
-class PlanningState:
-    """What stacks and profiles are previewed of; clouds are compared by identity."""
-
-    cloud: PointCloud | None = None
-    settings: Settings = Settings()
-
-
-@dataclass(frozen=True)
-class PlanState:
-    """What a detection would cut, or a word on why it is not known."""
-
-    plan: "Plan | None" = None
-    message: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class PreviewState:
-    """A profile of the plan's stack `row`, not yet cut while `preview` is None."""
-
-    plan: "Plan | None" = None
-    row: int = 0
-    index: int = 0
-    preview: "ProfilePreview | None" = None
-    message: str = ""
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
-from pipegui import commands, describe, edit_commands, view_commands
+from pipegui import commands, cuts, describe, edit_commands, files, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
+from pipegui.presets import Presets
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -23,6 +24,9 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
     edits = window.edits
     found: dict[str, Callable[..., object]] = {
         "open": menu.open,
+        "open_project": window.projects.ask_open,
+        "save": window.projects.save,
+        "save_as": window.projects.save_as,
         "close_scan": lambda: do(commands.close_scan, window.document.active),
         "load_settings": menu.load_settings,
         "save_settings": menu.save_settings,
@@ -102,6 +106,10 @@ def connect_panels(window: "MainWindow") -> None:
         lambda keys: window.stored.setValue("table/columns", " ".join(keys))
     )
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
+    panels.settings.keys_reset.connect(lambda keys: do(commands.reset_keys, keys))
+    panels.settings.presets.chosen.connect(lambda settings: do(commands.apply_preset, settings))
+    panels.settings.presets.failed.connect(lambda text: panels.message.tell(text, "error"))
+    panels.settings.presets.use(Presets(files.preset_folder()))
     panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
     panels.stacks.preset_chosen.connect(lambda preset: do(commands.set_preset, preset))
     panels.stacks.added.connect(lambda stack: do(commands.add_stack, stack))
@@ -151,11 +159,31 @@ def connect_views(window: "MainWindow") -> None:
     parts.radius_plot.pins_cleared.connect(lambda: do(commands.set_view, pinned_elements=()))
     parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
     parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
+    parts.map.spot_hovered.connect(lambda place: _mark_in_scene(window, place))
+    parts.scene.hovered.connect(lambda i: _mark_on_map(window, i))
     parts.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
     for plot in (parts.radius_plot, parts.section, parts.map, parts.preview):
         plot.save_requested.connect(
             lambda ending, plot=plot: window.menu_actions.save_plot(plot, ending)
         )
+
+
+def _mark_in_scene(window: "MainWindow", place: tuple[float, float] | None) -> None:
+    """Show in 3D what the cursor is at on the map."""
+    result, element_id = window.document.result, window.document.selection.element_id
+    spot = None
+    if place is not None and result is not None and element_id:
+        spot = cuts.spot_on_surface(result, element_id, *place)
+    window.parts.scene.mark_spot(spot)
+
+
+def _mark_on_map(window: "MainWindow", point_index: int) -> None:
+    """Show on the map what the cursor is at in 3D, if it is on the selected element."""
+    scan, element_id = window.document.scan, window.document.selection.element_id
+    place = None
+    if scan is not None and scan.result is not None:
+        place = cuts.spot_of_point(scan.cloud, scan.result, element_id, point_index)
+    window.parts.map.show_cursor(place)
 
 
 def connect_previews(window: "MainWindow") -> None:
@@ -189,11 +217,17 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.started.connect(status.start)
     jobs.progressed.connect(status.progress)
     jobs.cancelling.connect(status.show_cancelling)
+    jobs.glimpsed.connect(window.show_glimpse)
+    jobs.ended.connect(window.end_glimpse)
     jobs.ended.connect(status.end)
+    jobs.beside.connect(status.show_beside)
     jobs.busy_changed.connect(lambda _: window.update_actions())
     jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))
     jobs.failed.connect(lambda message, details: tell(message, "error", details))
     jobs.scan_read.connect(window.take_scan)
     jobs.detected.connect(window.take_result)
     jobs.edited.connect(window.edits.take)
+    if (rescue := window.projects.rescue) is not None:
+        jobs.detected.connect(lambda *_: rescue.keep())
+        jobs.edited.connect(lambda _: rescue.keep())
     jobs.written.connect(lambda path: tell(f"Saved “{path}”."))

@@ -10,6 +10,7 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import count
 from typing import Any
@@ -38,6 +39,14 @@ class Progressed:
     """Once it has run long enough to tell."""
 
 
+@dataclass(frozen=True, eq=False)
+class Glimpsed:
+    """A part of what a job makes can be shown already."""
+
+    job: int
+    part: Any
+
+
 @dataclass(frozen=True)
 class Finished:
     """A job has made its value."""
@@ -62,7 +71,7 @@ class Cancelled:
     job: int
 
 
-Event = Started | Progressed | Finished | Failed | Cancelled
+Event = Started | Progressed | Glimpsed | Finished | Failed | Cancelled
 
 EVENTS_PER_SECOND = 15
 PATIENCE_MS = 450
@@ -100,6 +109,11 @@ class JobProgress:
         elapsed = now - self._since
         left = elapsed * (1 - done) / done if elapsed > 1.0 and done > 0.05 else None
         self._emit(Progressed(self._job, stage, done, left))
+
+    def look(self, part: Any) -> None:
+        """Show a part of what the job makes."""
+        if not self.is_cancelled.is_set():
+            self._emit(Glimpsed(self._job, part))
 
     def _of_all(self, stage: str, fraction: float) -> float:
         """How much of the whole work is done; of the stage where no more is known."""
@@ -168,7 +182,10 @@ class Worker(QObject):
     def _run(self) -> None:
         while (item := self._jobs.get()) is not None:
             progress, job, work = item
-            self._posted.emit(_end_of(progress, job, work))
+            ended = _end_of(progress, job, work)
+            # Who closed does not wait for ever: nobody may be there to hear of the end.
+            with suppress(RuntimeError):
+                self._posted.emit(ended)
 
     @Slot(object)
     def _deliver(self, event: Event) -> None:

@@ -262,7 +262,7 @@ class DeformationSettings:
         3.0, "Smallest depth", "Shallower deviations are not reported.", unit="mm", minimum=0.1
     )
     significance: float = setting(
-        6.0,
+        5.5,
         "Significance",
         "A deviation counts if it is this many times its own noise.",
         minimum=2.0,
@@ -281,7 +281,19 @@ class DeformationSettings:
         zero_means="not known",
     )
     rule: str = setting(
-        "asme-6pct", "Acceptance rule", "The rule that judges each deformation, by its file name."
+        "asme-6pct",
+        "Acceptance rule",
+        "The rule that judges each deformation: the name of one that comes with the program, "
+        "or the path of your own .toml file.",
+    )
+    mesh_exaggeration: float = setting(
+        0.0,
+        "Mesh of deformations",
+        "Reports have deformations.ply: dented surfaces, deviations this many times larger.",
+        minimum=0.0,
+        maximum=100.0,
+        zero_means="no mesh",
+        advanced=True,
     )
 
 

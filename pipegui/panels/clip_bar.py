@@ -34,14 +34,14 @@ class ClipBar(QWidget):
             row.addWidget(name)
             self.ends.append([QuietSpinBox() for _ in range(2)])
             for field in self.ends[-1]:
-                field.setDecimals(3)
+                field.setDecimals(2)
                 field.setRange(-1e9, 1e9)
                 field.setSingleStep(STEP)
                 field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
                 field.setMinimumWidth(7 * theme.SPACING)
                 field.valueChanged.connect(self._tell)
                 row.addWidget(field, 1)
-        self.whole = self._button("Whole scan", self.whole_requested)
+        self.whole = self._button("All", self.whole_requested)
         self.selection = self._button("Selection", self.selection_requested)
         self.close_ = self._button("Off", self.closed)
         for button in (self.whole, self.selection, self.close_):

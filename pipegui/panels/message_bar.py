@@ -1,5 +1,8 @@
 """A line above the 3D view that says what happened, without being in the way."""
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import (
@@ -40,7 +43,8 @@ class MessageBar(QFrame):
         self.close_button = QToolButton()
         self.close_button.setAccessibleName("Close the message")
         self.close_button.clicked.connect(self.hide)
-        row = QHBoxLayout(self)
+        self.answer_buttons: list[QToolButton] = []
+        row = self._row = QHBoxLayout(self)
         row.setContentsMargins(12, theme.SPACING // 2, theme.SPACING // 2, theme.SPACING // 2)
         row.setSpacing(theme.SPACING)
         row.addWidget(self._icon)
@@ -49,9 +53,19 @@ class MessageBar(QFrame):
         row.addWidget(self.close_button)
         self.hide()
 
-    def tell(self, text: str, severity: str = "info", details: str = "") -> None:
-        """Show a message; `severity` is "info", "warning" or "error"."""
+    def tell(
+        self,
+        text: str,
+        severity: str = "info",
+        details: str = "",
+        answers: Mapping[str, Callable[[], object]] = MappingProxyType({}),
+    ) -> None:
+        """Show a message; `severity` is "info", "warning" or "error".
+
+        `answers` are buttons with what they do; the message goes with the first of them.
+        """
         self._details = details
+        self._offer(answers)
         self.text.setText(text)
         icon, tint = _ICONS[severity]
         self._icon.setPixmap(theme.icon(icon, tint).pixmap(theme.icon_size()))
@@ -61,6 +75,19 @@ class MessageBar(QFrame):
         self.style().unpolish(self)
         self.style().polish(self)
         self.show()
+
+    def _offer(self, answers: Mapping[str, Callable[[], object]]) -> None:
+        for button in self.answer_buttons:
+            self._row.removeWidget(button)
+            button.hide()
+            button.deleteLater()
+        self.answer_buttons = []
+        for text, act in answers.items():
+            button = QToolButton()
+            button.setText(text)
+            button.clicked.connect(lambda _=False, act=act: (self.hide(), act()))
+            self._row.insertWidget(self._row.count() - 1, button)
+            self.answer_buttons.append(button)
 
     def _show_details(self) -> None:
         dialog = QDialog(self.window())

@@ -129,7 +129,8 @@ class ProjectModel(QAbstractItemModel):
         self, parent: _Node, run_id: int, elements: list[Element], ranked: list[Deformation]
     ) -> None:
         if len(elements) > 1:
-            run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, f"Run {run_id}")
+            text = f"Run {run_id} ({len(elements)})"
+            run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, text)
             run.icon, run.elements = "pipe-disconnected", tuple(e.element_id for e in elements)
             run.hint = format_count(len(elements), "element")
             parent = self._add(run)

@@ -7,6 +7,7 @@ from typing import Any
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFormLayout,
+    QHBoxLayout,
     QLabel,
     QLineEdit,
     QScrollArea,
@@ -18,6 +19,7 @@ from PySide6.QtWidgets import (
 from pipecore.rules import list_rules
 from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipegui import theme
+from pipegui.panels.preset_bar import PresetBar
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
 
 ELSEWHERE = {"stacks.preset", "stacks.directions"} | {
@@ -43,6 +45,8 @@ class SettingsForm(QScrollArea):
     changed = Signal(str, object)
     """Dotted key and new value."""
     reset_requested = Signal()
+    keys_reset = Signal(list)
+    """Dotted keys that are to go back to their defaults."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -52,17 +56,22 @@ class SettingsForm(QScrollArea):
         self._applying = Applying()
         self._show: dict[str, Callable[[Any], None]] = {}
         self._labels: dict[str, QLabel] = {}
+        self._resets: dict[str, QToolButton] = {}
+        self._group_resets: list[tuple[list[str], QToolButton]] = []
         self._specs = {key: spec for key, spec in iterate_fields() if key not in ELSEWHERE}
         body = QWidget()
         column = QVBoxLayout(body)
         column.setContentsMargins(theme.SPACING, theme.SPACING, theme.SPACING, theme.SPACING)
         column.setSpacing(theme.SPACING)
+        self.presets = PresetBar()
+        column.addWidget(self.presets)
         self._add_groups(column, advanced=False)
         self.advanced = _Fold("Advanced")
         self._add_groups(self.advanced.content, advanced=True)
         column.addWidget(self.advanced)
         self.reset = QToolButton()
         self.reset.setText("Reset to defaults")
+        self.reset.setToolTip("All settings back to the defaults; own stacks stay")
         self.reset.clicked.connect(self.reset_requested)
         column.addWidget(self.reset)
         column.addStretch()
@@ -78,9 +87,7 @@ class SettingsForm(QScrollArea):
             }
             if not specs:
                 continue
-            heading = QLabel(title)
-            heading.setProperty("heading", True)
-            column.addWidget(heading)
+            column.addLayout(self._heading(title, list(specs)))
             form = QFormLayout()
             form.setContentsMargins(0, 0, 0, theme.SPACING // 2)
             form.setSpacing(theme.SPACING // 2)
@@ -95,8 +102,37 @@ class SettingsForm(QScrollArea):
                 for widget in (label, field):
                     widget.setToolTip(_help(spec))
                 self._labels[key] = label
-                form.addRow(label, field)
+                row = QHBoxLayout()
+                row.setSpacing(0)
+                row.addWidget(field, 1)
+                tip = f"Set “{spec.label}” back to its default"
+                self._resets[key] = self._reset_button(tip, [key])
+                row.addWidget(self._resets[key])
+                form.addRow(label, row)
             column.addLayout(form)
+
+    def _heading(self, title: str, keys: list[str]) -> QHBoxLayout:
+        heading = QLabel(title)
+        heading.setProperty("heading", True)
+        button = self._reset_button(f"Set all of “{title}” back to the defaults", keys)
+        self._group_resets.append((keys, button))
+        row = QHBoxLayout()
+        row.addWidget(heading, 1)
+        row.addWidget(button)
+        return row
+
+    def _reset_button(self, tip: str, keys: list[str]) -> QToolButton:
+        button = QToolButton()
+        button.setIcon(theme.icon("restore", "muted"))
+        button.setIconSize(theme.icon_size(1.75))
+        button.setAutoRaise(True)
+        button.setToolTip(tip)
+        button.setAccessibleName(tip)
+        policy = button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)  # fields must not move when one is changed
+        button.setSizePolicy(policy)
+        button.clicked.connect(lambda: self.keys_reset.emit(keys))
+        return button
 
     def _field(self, key: str, spec: FieldSpec) -> QWidget:
         if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
@@ -158,8 +194,13 @@ class SettingsForm(QScrollArea):
                 font = self._labels[key].font()
                 font.setBold(settings.get(key) != spec.default)
                 self._labels[key].setFont(font)
-        changed = any(settings.get(key) != spec.default for key, spec in self._specs.items())
-        self.reset.setEnabled(changed)
+        changed = {k for k, spec in self._specs.items() if settings.get(k) != spec.default}
+        for key, button in self._resets.items():
+            button.setVisible(key in changed)
+        for keys, button in self._group_resets:
+            button.setVisible(len(keys) > 1 and not changed.isdisjoint(keys))
+        self.reset.setEnabled(bool(changed))
+        self.presets.apply(settings)
 
 
 def _help(spec: FieldSpec) -> str:

@@ -24,7 +24,8 @@ from pipecore.types import NO_ID, Stack
 from pipegui import theme
 from pipegui.panels.stack_editor import StackEditor
 from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
-from pipegui.view_state import PlanState, StacksState
+from pipegui.plan_state import PlanState
+from pipegui.view_state import StacksState
 
 PRESET_TEXT = {
     DirectionPreset.AUTOMATIC: "Automatic",

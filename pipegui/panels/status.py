@@ -38,6 +38,10 @@ class StatusBar(QStatusBar):
         row.setSpacing(theme.SPACING)
         for widget in (self.job, self.bar, self.cancel):
             row.addWidget(widget)
+        self.warming = QLabel("Preparing the detection for this computer (once)…")
+        self.warming.setToolTip("You can work meanwhile; a detection started now takes longer.")
+        self.warming.hide()
+        self.addPermanentWidget(self.warming)
         self.addWidget(self.scan)
         self.addWidget(self.cursor_position)
         self.addPermanentWidget(self._job_box)
@@ -85,12 +89,27 @@ class StatusBar(QStatusBar):
             f"{self.job.text().split(' · ')[0]} · working (the first run takes longer)"
         )
 
+    def show_beside(self, title: str) -> None:
+        """Show what goes on beside the running job."""
+        if title:
+            self.showMessage(f"{title}…")
+        else:
+            self.clearMessage()
+
     def show_cancelling(self) -> None:
         """Answer a cancel at once, before the work has stopped."""
         if self._job_box.isVisible():
             self.cancel.setEnabled(False)
             self.job.setText("Cancelling…")
             self._silence.stop()
+
+    def start_warming(self) -> None:
+        """Say that the program gets ready for its first detection."""
+        self.warming.show()
+
+    def end_warming(self) -> None:
+        """Say no more of it."""
+        self.warming.hide()
 
     def end(self) -> None:
         """Show that nothing runs any more."""

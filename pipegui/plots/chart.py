@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QAction, QColor, QCursor, QFont, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (
     QHBoxLayout,
@@ -188,6 +188,11 @@ class Chart(QWidget):
     def on_hover(self, act: Callable[[pg.PlotItem | None, QPointF], None]) -> None:
         """Call `act` with the plot under the cursor (or None) when the mouse moves."""
         self.canvas.scene().sigMouseMoved.connect(lambda at: act(self._plot_at(at), at))
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Let go of what was under the cursor."""
+        super().leaveEvent(event)
+        self.canvas.scene().sigMouseMoved.emit(QPointF(-1e4, -1e4))
 
     def _plot_at(self, position: QPointF) -> pg.PlotItem | None:
         for plot in self.plots():

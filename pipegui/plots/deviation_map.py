@@ -32,6 +32,8 @@ class DeviationMap(Chart):
     spot_clicked = Signal(float, float)
     """Chainage in metres and clock angle in radians."""
     deformation_clicked = Signal(int)
+    spot_hovered = Signal(object)
+    """(chainage, clock) under the cursor, or None."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(EMPTY, parent)
@@ -48,6 +50,9 @@ class DeviationMap(Chart):
         self._image = pg.ImageItem(axisOrder="row-major")
         self._shapes: list[object] = []
         self.plot.addItem(self._image)
+        self._cursor = pg.ScatterPlotItem(size=14, brush=pg.mkBrush(None), antialias=True)
+        self._cursor.setZValue(20)
+        self.plot.addItem(self._cursor, ignoreBounds=True)
         self.on_click(self._click)
         self.on_hover(self._hover)
         self.setAccessibleName("Deviation map")
@@ -185,7 +190,20 @@ class DeviationMap(Chart):
             self.spot_clicked.emit(*self._place(position))
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        self.readout.setText(self._text_at(position) if plot and self._map else "")
+        is_inside = plot is not None and self._map is not None
+        self.readout.setText(self._text_at(position) if is_inside else "")
+        place = self._place(position) if is_inside else None
+        is_on_it = place is not None and self._map.cell(*place) is not None
+        self.spot_hovered.emit(place if is_on_it else None)
+
+    def show_cursor(self, place: tuple[float, float] | None) -> None:
+        """Show where another view's cursor is: chainage and clock, or nowhere."""
+        if place is None or self._map is None:
+            self._cursor.clear()
+            return
+        chainage, clock = place
+        pen = pg.mkPen(theme.colour("accent"), width=2)
+        self._cursor.setData([chainage], [float(np.rad2deg(from_clock(clock)))], pen=pen)
 
     def _text_at(self, position: QPointF) -> str:
         chainage, clock = self._place(position)

@@ -1,5 +1,7 @@
 """One profile as it would be cut: its points by curve, and the ellipses found in it."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal
@@ -7,16 +9,18 @@ from PySide6.QtGui import QColor, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
 from pipecore.geometry import Array
-from pipecore.preview import ProfilePreview
 from pipecore.report.format import cell, format_count
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
+from pipegui.plan_state import PreviewState
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.exaggeration import ellipse_points
 from pipegui.plots.export import Table
 from pipegui.plots.section_view import FAR, STEPS
 from pipegui.section_cut import Ellipse
-from pipegui.view_state import PreviewState
+
+if TYPE_CHECKING:
+    from pipecore.preview import ProfilePreview
 
 EMPTY = (
     "Open a scan to see one of its profiles with its curves before you detect. "
@@ -103,7 +107,7 @@ class PreviewView(Chart):
             self._fitted = shown
             self.fit()
 
-    def _draw(self, preview: ProfilePreview) -> None:
+    def _draw(self, preview: "ProfilePreview") -> None:
         self.plot.clear()
         self.readout.clear()
         shown = slice(None, None, max(1, -(-len(preview.uv) // MAX_POINTS)))
@@ -118,7 +122,7 @@ class PreviewView(Chart):
         for row in range(len(preview.ellipses)):
             self.plot.plot(*self._ellipse(preview, row).T, pen=pen, antialias=True)
 
-    def _ellipse(self, preview: ProfilePreview, row: int) -> Array:
+    def _ellipse(self, preview: "ProfilePreview", row: int) -> Array:
         centre, major, minor, angle = preview.ellipse_uv(row)
         place = float(centre[0]), float(centre[1])
         return ellipse_points(Ellipse(place, major, minor, angle)) @ upright(preview).T
@@ -193,7 +197,7 @@ class PreviewView(Chart):
         self.readout.clear()
 
 
-def upright(preview: ProfilePreview) -> Array:
+def upright(preview: "ProfilePreview") -> Array:
     """Turn the plane's axes so that up is up, or north where the plane is level."""
     up = preview.frame[:2] @ np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(up) < LEVEL:
@@ -202,7 +206,7 @@ def upright(preview: ProfilePreview) -> Array:
     return np.array([[y, -x], [x, y]])
 
 
-def summary_of(preview: ProfilePreview) -> str:
+def summary_of(preview: "ProfilePreview") -> str:
     """Say what was found in a profile."""
     if not preview.n_points:
         return "This profile holds no points."

@@ -7,12 +7,12 @@ import numpy as np
 from PySide6.QtCore import QEasingCurve, QEvent, QPointF, Qt, QTimer, QVariantAnimation, Signal
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
-from pyvistaqt.rwi import QVTKRenderWindowInteractor
 from vtkmodules.vtkRenderingCore import vtkCamera, vtkRenderer
 from vtkmodules.vtkRenderingOpenGL2 import vtkEDLShading, vtkRenderStepsPass
 
 from pipecore.geometry import Array
 from pipegui.scene import pose as poses
+from pipegui.scene.interactor import QVTKRenderWindowInteractor
 from pipegui.scene.pose import VIEW_ANGLE, Pose
 from pipegui.scene.projection import Projection, as_array
 

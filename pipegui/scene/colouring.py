@@ -27,7 +27,7 @@ MUTED = {False: (217, 221, 227), True: (70, 76, 84)}
 """Points that the colouring says nothing about, on light and on dark background."""
 
 KIND_COLOUR = dict(zip(ElementKind, KINDS, strict=True))
-NO_CURVE = (128, 128, 128)
+NO_ELEMENT = (128, 128, 128)
 SOUND = (157, 190, 217)
 """Where a pipe has no deformation, in the colours of the verdicts."""
 PROFILE_COLOURS = QUALITATIVE[[0, 1]]
@@ -220,10 +220,10 @@ def profile_rows(cloud: PointCloud, stack: Stack, profile_index: int) -> NDArray
 
 
 def profile_colours(cloud: PointCloud, result: Result, rows: NDArray[np.intp]) -> Colours:
-    """Return the colours of a profile's curves, each as its segment; muted where there is none."""
-    table = QUALITATIVE[_apart(cloud, result, ColourBy.SEGMENT)]
-    table[NO_ID] = NO_CURVE
-    return table[result.segment_id[rows]]
+    """Return the colours of a profile's points, each as its element, grey where there is none."""
+    table = QUALITATIVE[_apart(cloud, result, ColourBy.ELEMENT)]
+    table[NO_ID] = NO_ELEMENT
+    return table[result.element_id[rows]]
 
 
 def stack_of(result: Result, stack_id: int) -> Stack | None:

@@ -11,6 +11,7 @@ from pipegui.colours import VERDICT
 from pipegui.document import ColourBy, ViewOptions
 from pipegui.scene.colouring import (
     KIND_COLOUR,
+    NO_ELEMENT,
     PROFILE_COLOURS,
     SOUND,
     effective,
@@ -100,6 +101,11 @@ def _profile_legend(result: Result, view: ViewOptions) -> Legend:
     stack = stack_of(result, view.shown_stack)
     if stack is None:
         return Legend("No stack is shown: tick one in the stacks panel.")
+    if view.shown_profile is not None:
+        return Legend(
+            f"One profile of {stack.name or f'stack {stack.stack_id}'}",
+            swatches=((NO_ELEMENT, "of no element"),),
+        )
     even, odd = (tuple(c) for c in PROFILE_COLOURS.tolist())
     return Legend(
         f"{stack.name or f'Stack {stack.stack_id}'}, {1000 * stack.width:.0f} mm wide",

@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from pipecore.types import Floats
 
@@ -27,6 +26,8 @@ def neighbouring_ids(
     ndarray of int32, shape (m, 2)
         Sorted, the smaller id first, each pair once.
     """
+    from scipy.spatial import cKDTree  # noqa: PLC0415 - takes its time
+
     labelled = np.flatnonzero(ids)
     labelled = labelled[:: max(1, len(labelled) // N_SAMPLED)]
     if not len(labelled):

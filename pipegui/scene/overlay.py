@@ -1,5 +1,6 @@
 """What is written over the picture: labels, legend, scale bar, directions."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,10 @@ from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from pipecore.geometry import Array
+from pipecore.report.format import format_measure
+from pipecore.types import Deformation, DeformationKind
 from pipegui import theme
+from pipegui.colours import VERDICT
 from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
@@ -68,6 +72,26 @@ def place_box(
     return None
 
 
+def label_of(deformation: Deformation, *, is_selected: bool) -> Label:
+    """Return what is written at a deformation's peak."""
+    if deformation.kind is DeformationKind.OVALITY and math.isfinite(deformation.ovality):
+        size = format_measure(100 * deformation.ovality, unit="%")
+    else:
+        size = format_measure(1000 * deformation.depth, 1000 * deformation.depth_sd, "mm")
+    return Label(
+        deformation.deformation_id,
+        f"{str(deformation.kind).capitalize()} {size}",
+        theme.verdict_icon(deformation.verdict),
+        QColor(VERDICT[deformation.verdict]),
+        np.asarray(deformation.peak, np.float64),
+        is_selected,
+    )
+
+
+SPOT = 9.0
+"""Radius of the ring around another view's cursor, pixels."""
+
+
 class Overlay(QWidget):
     """Lies over the canvas and is transparent to the mouse."""
 
@@ -79,6 +103,8 @@ class Overlay(QWidget):
         self.marks: tuple[MeasureMark, ...] = ()
         self.handles: Array | None = None
         """Of the clip box, local coordinates, shape (n, 3)."""
+        self.spot: Array | None = None
+        """Where another view's cursor is, local coordinates, shape (3,)."""
         self.hint = ""
         """What to do next, at the top."""
         self._crosses: list[tuple[QRectF, int]] = []
@@ -112,6 +138,8 @@ class Overlay(QWidget):
             taken.append(self._draw_legend(painter, self.legend))
         if self.handles is not None:
             self._draw_handles(painter, self._projection, self.handles)
+        if self.spot is not None:
+            self._draw_spot(painter, self._projection, self.spot)
         if self.hint:
             taken.append(self._draw_hint(painter, self.hint))
         accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
@@ -126,6 +154,17 @@ class Overlay(QWidget):
         painter.setBrush(self._tint("base"))
         for x, y in pixels[np.isfinite(pixels).all(axis=1)]:
             painter.drawEllipse(QPointF(x, y), HANDLE, HANDLE)
+
+    def _draw_spot(self, painter: QPainter, projection: Projection, spot: Array) -> None:
+        pixels, _ = projection.to_screen(spot[None])
+        if not np.isfinite(pixels).all():
+            return
+        at = QPointF(*pixels[0].tolist())
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for colour, width in ((self._paper(), 4.0), (self._tint("accent"), 2.0)):
+            painter.setPen(QPen(colour, width))
+            painter.drawEllipse(at, SPOT, SPOT)
+            painter.drawPoint(at)
 
     def _draw_hint(self, painter: QPainter, text: str) -> QRectF:
         metrics = painter.fontMetrics()
@@ -146,6 +185,11 @@ class Overlay(QWidget):
             return
         area, ground = self.rect(), tuple(taken)
         pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
+        # A label must not cover what another one points at.
+        spots = [
+            QRectF(x - 8, y - 8, 16, 16) if np.isfinite(x) and np.isfinite(y) else QRectF()
+            for x, y in pixels
+        ]
         order = sorted(range(len(self.labels)), key=lambda i: not self.labels[i].is_selected)
         marks = []
         for i in order:
@@ -157,7 +201,12 @@ class Overlay(QWidget):
             width = painter.fontMetrics().horizontalAdvance(label.text) + ICON + 3 * SPACING
             # The selected one is looked at: its label must not cover it.
             leader = 2.5 * LEADER if label.is_selected else LEADER
-            box = place_box(anchor, QSize(width, 3 * SPACING), area, taken, leader)
+            others = [spot for k, spot in enumerate(spots) if k != i]
+            size = QSize(width, 3 * SPACING)
+            # Where it is crowded, better over another's spot than not at all.
+            box = place_box(anchor, size, area, [*taken, *others], leader) or place_box(
+                anchor, size, area, taken, leader
+            )
             marks.append((anchor, box, label))
             self._targets.append((QRectF(anchor.x() - 7, anchor.y() - 7, 14, 14), i))
             if box is not None:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from pipecore.geometry import Array
@@ -16,8 +15,7 @@ LAYER_PX = 10.0
 """Points whose depths differ by less than this on screen count as one surface."""
 
 
-@njit(cache=True, nogil=True)
-def _find_near(xyz, matrix, cursor, radius, rows, depths, distances):  # pragma: no cover
+def _find_near(xyz, matrix, cursor, radius, rows, depths, distances):
     """Fill the three arrays with the points within `radius` of `cursor`; return their number.
 
     Points for which there is no room are counted only. Serial on purpose: numba's plain
@@ -47,14 +45,23 @@ def _find_near(xyz, matrix, cursor, radius, rows, depths, distances):  # pragma:
     return n_found
 
 
+@cache
+def _compiled() -> Callable[..., int]:
+    """Return the kernel as numba makes it, which the start of the window does not wait for."""
+    from numba import njit  # noqa: PLC0415
+
+    return njit(cache=True, nogil=True)(_find_near)
+
+
 def points_near(
     xyz: NDArray[np.floating],
     projection: Projection,
     cursor: tuple[float, float],
     radius: float,
-    kernel: Callable[..., int] = _find_near,
+    kernel: Callable[..., int] | None = None,
 ) -> tuple[NDArray[np.int64], Array, Array]:
     """Return rows, depths (metres) and distances (pixels) of the points near `cursor`."""
+    kernel = kernel or _compiled()
     room = 1024
     while True:
         rows, depths, distances = np.empty(room, np.int64), np.empty(room), np.empty(room)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 from vtkmodules.util.numpy_support import numpy_to_vtk
 from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
@@ -19,16 +18,19 @@ from pipegui.colour_maps import Colours
 from pipegui.document import Box
 from pipegui.scene.spreading import Spread
 
-SMALLEST_SLICE, LARGEST_SLICE = 25_000, 4_000_000
+SMALLEST_SLICE, LARGEST_SLICE = 25_000, 1_000_000
 MOVING_LEVEL = 400_000
 """At most so many points are drawn while the camera moves."""
 MOVING_SECONDS = 0.06
 """For the points of a frame while the camera moves: the rest of 0.1 s is for all else."""
 FRAME_SECONDS = 0.02
 """What a frame costs without points, about."""
+MOST_WITHOUT_CARD = 6_000_000
+"""At most so many points at rest where memory has to stand in for a graphics card: each takes
+over 100 bytes there, and a large window has fewer pixels."""
 MIN_POINT_PX, MAX_POINT_PX = 1.0, 5.0
 
-Rows = NDArray[np.intp]
+Rows = NDArray[np.int32]
 ColourRows = Callable[[Rows], Colours]
 """Colours (n, 3) of rows of the cloud."""
 
@@ -75,9 +77,11 @@ class PointLayer:
         self._spread = Spread(0)
         self._colour: ColourRows | None = None
         self._slices: list[_Slice] = []
-        self._seconds_per_point = 1e-7
+        self.seconds_per_point = 1e-7
         self._clip: Box | None = None
         self._is_drawing_new = False
+        self.most = MOST_WITHOUT_CARD
+        """At most so many points are drawn."""
         self.n_shown = 0
         """Number of points in the slices that are shown."""
         self.spacing = 0.01
@@ -108,11 +112,12 @@ class PointLayer:
         self, cloud: PointCloud, visible: NDArray[np.bool_] | None, colour: ColourRows
     ) -> None:
         """Show the `visible` points (None: all) of a cloud."""
+        is_new = cloud is not self._cloud
         self.clear_actors()
-        if cloud is not self._cloud:
+        if is_new:
             self.spacing = estimate_spacing(cloud.xyz)
         self._cloud, self._colour = cloud, colour
-        self._visible = None if visible is None else np.flatnonzero(visible)
+        self._visible = None if visible is None else np.flatnonzero(visible).astype(np.int32)
         self._spread = Spread(len(cloud) if self._visible is None else len(self._visible))
         self._reach(SMALLEST_SLICE)
 
@@ -131,8 +136,8 @@ class PointLayer:
 
         A pixel is `pixel_size` metres large at the focus.
         """
-        limit = (seconds or MOVING_SECONDS) / self._seconds_per_point
-        limit = max(limit, MOVING_LEVEL) if seconds else min(limit, MOVING_LEVEL)
+        limit = (seconds or MOVING_SECONDS) / self.seconds_per_point
+        limit = min(max(limit, MOVING_LEVEL), self.most) if seconds else min(limit, MOVING_LEVEL)
         shown = self._reach(limit) if visible else []
         self.n_shown = shown[-1].stop if shown else 0
         self._is_drawing_new = not all(part.is_uploaded for part in shown)
@@ -152,7 +157,7 @@ class PointLayer:
             measured = max(seconds - FRAME_SECONDS, 1e-4) / self.n_shown
             # A frame of few points says little about what a point costs.
             weight = 0.5 * min(self.n_shown / MOVING_LEVEL, 1)
-            self._seconds_per_point += weight * (measured - self._seconds_per_point)
+            self.seconds_per_point += weight * (measured - self.seconds_per_point)
 
     def clip(self, box: Box) -> None:
         """Draw only what lies in the box; see `set_points` for leaving points out."""
@@ -165,8 +170,13 @@ class PointLayer:
         for part in self._slices:
             self._renderer.RemoveActor(part.actor)
         self._slices, self.n_shown = [], 0
-        self._cloud = self._visible = self._colour = self._clip = None
+        self._visible = self._colour = self._clip = None
         self._spread = Spread(0)
+
+    def forget(self) -> None:
+        """Let go of the cloud too."""
+        self.clear_actors()
+        self._cloud = None
 
     def _reach(self, limit: float) -> list[_Slice]:
         """Return the slices up to `limit` points, at least the first; make those not there yet."""
@@ -181,7 +191,7 @@ class PointLayer:
     def _make_slice(self, start: int, stop: int) -> _Slice:
         assert self._cloud is not None
         assert self._colour is not None
-        rows = self._spread.rows(start, stop)
+        rows = self._spread.rows(start, stop).astype(np.int32)
         if self._visible is not None:
             rows = self._visible[rows]
         xyz = np.take(self._cloud.xyz, rows, axis=0).astype(np.float32, copy=False)
@@ -210,6 +220,8 @@ def set_planes(actor: vtkActor, box: Box | None) -> None:
 
 def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:
     """Return about how far points are from each other on a surface, metres."""
+    from scipy.spatial import cKDTree  # noqa: PLC0415 - takes its time
+
     if len(xyz) < 2:
         return 0.01
     sample = xyz[np.unique(np.random.default_rng(0).integers(0, len(xyz), n_sampled))]

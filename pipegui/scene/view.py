@@ -1,8 +1,7 @@
 """The 3D view: takes a `SceneState`, shows it, and says what the user points at."""
 
-import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,9 @@ from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from pipecore.geometry import Array
-from pipecore.report.format import format_measure
-from pipecore.types import NO_ID, Deformation, DeformationKind
+from pipecore.types import NO_ID, PointCloud
 from pipegui import theme
 from pipegui.colour_maps import Colours
-from pipegui.colours import VERDICT
 from pipegui.document import Background, Box, Measurement, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene import pose as poses
@@ -24,9 +21,10 @@ from pipegui.scene.canvas import Canvas
 from pipegui.scene.clipping import BoxFrame
 from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.decorations import Decorations
+from pipegui.scene.glimpse import Glimpse
 from pipegui.scene.legend import make_legend
 from pipegui.scene.measure_marks import MeasureMark, lines_of
-from pipegui.scene.overlay import Label, Overlay
+from pipegui.scene.overlay import Overlay, label_of
 from pipegui.scene.picking import pick_point, warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
@@ -47,6 +45,7 @@ HINTS = {
 """Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
+NO_LIMIT = 2**31
 COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 
 
@@ -77,6 +76,7 @@ class SceneView(QWidget):
         self.points = PointLayer(self.canvas.layers[0])
         self._decorations = Decorations(self.canvas.layers)
         self._frame = BoxFrame(self.canvas.layers[1])
+        self._glimpse = Glimpse(self.canvas.layers[0])
         self._preview = PointLayer(self.canvas.layers[0])
         """All points, in the box or not, while the box is dragged."""
         layout = QVBoxLayout(self)
@@ -92,6 +92,7 @@ class SceneView(QWidget):
         self.canvas.left.connect(self._stop_hovering)
         self.canvas.before_frame.connect(self._prepare_frame)
         self.canvas.drawn.connect(self.points.learn)
+        self.canvas.drawn.connect(self._preview.learn)
         self.setAccessibleName("3D view")
         self._warming = threading.Thread(target=warm_up, name="warm up picking", daemon=True)
         self._warming.start()
@@ -124,7 +125,8 @@ class SceneView(QWidget):
     ) -> None:
         cloud, view = state.cloud, state.view
         if cloud is None:
-            self.points.clear_actors()
+            self.points.forget()
+            self._preview.forget()
             return
         is_new_result = state.result is not before.result
         is_recoloured = (
@@ -156,7 +158,7 @@ class SceneView(QWidget):
             self.overlay.legend = make_legend(state.cloud, state.result, state.view)
         if state.result is not None and state.view.show_labels:
             self.overlay.labels = tuple(
-                _label(d, is_selected=d.deformation_id == state.selection.deformation_id)
+                label_of(d, is_selected=d.deformation_id == state.selection.deformation_id)
                 for d in state.result.deformations
                 if d.element_id not in state.view.hidden_elements
                 and clipping.is_inside(state.view.clip_box, d.peak)
@@ -196,6 +198,18 @@ class SceneView(QWidget):
         """Whether steps in depth are shaded where nobody has chosen."""
         return self.canvas.is_drawn and not self.canvas.is_software
 
+    def glimpse(self, part: PointCloud) -> None:
+        """Show a part of a scan that is still being read, and all before it."""
+        if self._background is None:
+            self._set_background(_background(self._state.view))
+        self._glimpse.add(part)
+        self.canvas.fly_to(self._framed(self.canvas.pose, self._glimpse.sample), fly=False)
+
+    def end_glimpse(self) -> None:
+        """Take the parts away."""
+        self._glimpse.clear()
+        self.canvas.draw()
+
     # Camera
 
     def fit(self) -> None:
@@ -211,6 +225,25 @@ class SceneView(QWidget):
         """Move the camera to what is selected."""
         self._aim(self._state)
 
+    def camera(self) -> dict[str, list[float]]:
+        """Where the camera is, to be kept in a file."""
+        pose = self.canvas.pose
+        return {
+            "focus": pose.focus.tolist(),
+            "look": [pose.distance, pose.heading, pose.elevation],
+        }
+
+    def set_camera(self, camera: Mapping[str, list[float]]) -> None:
+        """Go where the camera was; stay if that is not told."""
+        focus, look = np.array(camera.get("focus", ())), camera.get("look", ())
+        if focus.shape == (3,) and len(look) == 3 and look[0] > 0:
+            self.canvas.fly_to(Pose(focus, *look), fly=False)
+
+    def mark_spot(self, spot: Array | None) -> None:
+        """Show where another view's cursor is, in local coordinates; None for nowhere."""
+        self.overlay.spot = spot
+        self.overlay.update()
+
     def view_direction(self) -> Array:
         """Unit vector in which the camera looks."""
         return self.canvas.pose.forward
@@ -218,7 +251,9 @@ class SceneView(QWidget):
     def _fitted(self, pose: Pose) -> Pose:
         if not len(self.points):
             return pose
-        sample = self.points.parts[0][:20_000].astype(np.float64)
+        return self._framed(pose, self.points.parts[0][:20_000].astype(np.float64))
+
+    def _framed(self, pose: Pose, sample: Array) -> Pose:
         # A few stray points far away must not make the rest small.
         low, high = np.percentile(sample, [0.2, 99.8], axis=0)
         margin = 0.2 * (high - low)
@@ -236,6 +271,8 @@ class SceneView(QWidget):
 
     def _prepare_frame(self) -> None:
         canvas, projection = self.canvas, self.canvas.projection()
+        if not canvas.is_software:
+            self.points.most = NO_LIMIT
         self.points.show(
             seconds=canvas.seconds_to_draw,
             pixel_size=projection.pixel_size(canvas.pose.distance),
@@ -266,6 +303,7 @@ class SceneView(QWidget):
         if handle < 0:
             return None
         visible = visible_points(state.cloud, state.result, state.view.hidden_elements)
+        self._preview.seconds_per_point = self.points.seconds_per_point
         self._preview.set_points(state.cloud, visible, self._colour)
         self._preview.clip(box)
 
@@ -353,8 +391,9 @@ class SceneView(QWidget):
         self._hover_timer.stop()
         self._decorations.clear()
         self._frame.show(None, (0.0, 0.0, 0.0))
-        self._preview.clear_actors()
-        self.points.clear_actors()
+        self._preview.forget()
+        self._glimpse.clear()
+        self.points.forget()
         self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)
@@ -364,18 +403,3 @@ def _background(view: ViewOptions) -> Background:
     if view.background is Background.SYSTEM:
         return Background.DARK if theme.is_dark() else Background.LIGHT
     return view.background
-
-
-def _label(deformation: Deformation, *, is_selected: bool) -> Label:
-    if deformation.kind is DeformationKind.OVALITY and math.isfinite(deformation.ovality):
-        size = format_measure(100 * deformation.ovality, unit="%")
-    else:
-        size = format_measure(1000 * deformation.depth, 1000 * deformation.depth_sd, "mm")
-    return Label(
-        deformation.deformation_id,
-        f"{str(deformation.kind).capitalize()} {size}",
-        theme.verdict_icon(deformation.verdict),
-        QColor(VERDICT[deformation.verdict]),
-        np.asarray(deformation.peak, np.float64),
-        is_selected,
-    )

@@ -1,13 +1,16 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipecore.errors import SettingsError
-from pipecore.rules import judge, list_rules, load_rule
+from pipecore.pipeline import judge_deformations
+from pipecore.report import write_report
+from pipecore.rules import Measure, judge, list_rules, load_rule
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, ElementKind, NominalSize, Verdict
-from tests.factories import make_result
+from tests.factories import make_result, make_scan
 
 RESULT = make_result(1000)
 PIPE = RESULT.element(2)  # DN 150, outside diameter 168.3 mm
@@ -169,3 +172,29 @@ def test_that_a_missing_rule_is_named_with_the_choice_there_is(tmp_path):
         load_rule("asme-7pct")
     with pytest.raises(SettingsError, match="no rule file"):
         load_rule(str(tmp_path / "gone.toml"))
+
+
+def test_that_the_path_of_an_own_rule_in_the_settings_judges_and_stands_in_the_report(tmp_path):
+    path = tmp_path / "our plant.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    own = Settings().replace({"deformation.rule": str(path)})
+    (tmp_path / "settings.toml").write_text(own.to_toml(), encoding="utf-8")
+    settings = Settings.from_toml(tmp_path / "settings.toml")
+    rule = load_rule(settings.deformation.rule)
+    judged = judge_deformations((dent(5.5), dent(4.5)), RESULT.elements, rule)
+    assert [d.verdict for d in judged] == [Verdict.REJECT, Verdict.ACCEPT]
+    cloud, result = make_scan(1000)
+    write_report(
+        tmp_path / "report", cloud, replace(result, settings=settings, deformations=judged)
+    )
+    table = (tmp_path / "report" / "deformations.csv").read_text(encoding="utf-8")
+    assert "our plant,reject" in table
+    assert "depth at most 5 mm" in (tmp_path / "report" / "report.html").read_text("utf-8")
+
+
+def test_that_every_rule_that_comes_with_the_program_is_told_in_the_documentation():
+    page = (Path(__file__).parents[2] / "docs" / "rules.md").read_text(encoding="utf-8")
+    for rule in list_rules():
+        assert f"`{rule.name}`" in page
+    for measure in Measure:
+        assert f"`{measure}`" in page

@@ -85,10 +85,14 @@ def make_window(
     windows: list[MainWindow] = []
 
     def make(
-        read=lambda *_: cloud, detect=lambda *_: result, parts=None, plan=lambda *_: None
+        read=lambda *_: cloud,
+        detect=lambda *_: result,
+        parts=None,
+        plan=lambda *_: None,
+        rescue=None,
     ) -> MainWindow:
         stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect, plan), stored)
+        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect, plan), stored, rescue)
         windows.append(window)
         window.resize(1366, 768)
         with qtbot.waitActive(window):  # without it keys do not reach the shortcuts
@@ -98,6 +102,7 @@ def make_window(
 
     yield make
     for window in windows:
+        window.projects.discard()
         window.close()
         window.deleteLater()
     windows.clear()

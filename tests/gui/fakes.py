@@ -38,17 +38,35 @@ class FakeScene(FakeView):
     def __init__(self) -> None:
         super().__init__()
         self.standard_views: list[str] = []
+        self.glimpses: list[Any] = []
+
+    def glimpse(self, part: Any) -> None:
+        self.glimpses.append(part)
+
+    def end_glimpse(self) -> None:
+        self.glimpses.append(None)
 
     shades_edges = False
 
     def set_standard_view(self, name: str) -> None:
         self.standard_views.append(name)
 
+    spot: Any = None
+
+    def mark_spot(self, spot: Any) -> None:
+        self.spot = spot
+
     def fit(self) -> None:
         self.standard_views.append("fit")
 
     def show_selection(self) -> None:
         self.standard_views.append("selection")
+
+    def camera(self) -> dict[str, list[float]]:
+        return {"focus": [1.0, 2.0, 3.0], "look": [4.0, 0.5, 0.25]}
+
+    def set_camera(self, camera: Any) -> None:
+        self.camera_set = camera
 
     def view_direction(self) -> np.ndarray:
         return np.array([0.0, 0.6, -0.8])
@@ -76,7 +94,12 @@ class FakePreview(FakeView):
 
 class FakeMap(FakeView):
     spot_clicked = Signal(float, float)
+    spot_hovered = Signal(object)
     deformation_clicked = Signal(int)
+    cursor: Any = None
+
+    def show_cursor(self, place: Any) -> None:
+        self.cursor = place
 
 
 def make_fake_parts() -> Parts:

@@ -17,7 +17,7 @@ from tests.gui.fakes import make_fake_parts
 def faked(qapp, monkeypatch):
     """The app over fakes, as `main` finds them."""
     monkeypatch.setattr("pipegui.parts.make_parts", make_fake_parts)
-    monkeypatch.setattr(jobs.Jobs.__init__, "__defaults__", (_read, _detect, None))
+    monkeypatch.setattr(jobs.Jobs.__init__, "__defaults__", (_read, _detect, _plan, None))
 
 
 def _read(path, settings, progress):
@@ -25,6 +25,10 @@ def _read(path, settings, progress):
     if not path.is_file():
         raise jobs.ReadError(f"There is no file “{path}”.")
     return make_cloud()
+
+
+def _plan(cloud, settings, progress):
+    return None
 
 
 def _detect(cloud, settings, progress):

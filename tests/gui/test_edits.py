@@ -164,7 +164,7 @@ def test_that_a_split_pipe_is_two_and_merged_again_is_one(window, qtbot):
     click(window, qtbot, new_id, CONTROL)
     qtbot.waitUntil(window.actions_["merge"].isEnabled)
     qtbot.keyClick(window, Qt.Key.Key_M, CONTROL)
-    qtbot.waitUntil(lambda: ids(window) == before, timeout=60_000)
+    qtbot.waitUntil(lambda: ids(window) == before, timeout=120_000)
     assert window.document.selection.element_id == 7
     assert "Merge Pipe 7" in window.panels.message.text.text()
     window.history.undo()
@@ -178,7 +178,7 @@ def test_that_pipes_that_cannot_be_merged_are_told_and_nothing_changes(window, q
     click(window, qtbot, 7)
     click(window, qtbot, 9, CONTROL)
     window.actions_["merge"].trigger()
-    qtbot.waitUntil(lambda: not window.jobs.is_busy)
+    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=120_000)
     assert "not of one size" in window.panels.message.text.text()
     assert window.panels.message.property("severity") == "error"
     assert window.document.result is result
@@ -192,7 +192,7 @@ def test_that_an_edit_of_what_was_changed_meanwhile_is_dropped(window, qtbot):
     click(window, qtbot, 9)
     qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
     kept = window.document.result
-    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=60_000)
+    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=120_000)
     assert window.document.result is kept
     assert "dropped" in window.panels.message.text.text()
 
@@ -215,7 +215,7 @@ def test_that_a_kind_is_chosen_and_measured_as_such(window, qtbot):
     assert "torus" not in dialog.comboBoxItems()
     dialog.setTextValue("flange")
     dialog.accept()
-    qtbot.waitUntil(lambda: window.document.result.element(2).kind == "flange", timeout=60_000)
+    qtbot.waitUntil(lambda: window.document.result.element(2).kind == "flange", timeout=120_000)
     assert not window.document.result.deformations_of(2)
 
 

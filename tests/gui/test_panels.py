@@ -88,7 +88,7 @@ def test_that_the_tree_holds_runs_elements_and_deformations(qtbot, document):
     model.apply(resolve(document).tree)
     scan = model.index(0, NAME)
     names = [model.index(r, NAME, scan).data() for r in range(model.rowCount(scan))]
-    assert names == ["Run 1", "Pipe 7", "Run 3", "Deformations (4)"]
+    assert names == ["Run 1 (6)", "Pipe 7", "Run 3 (2)", "Deformations (4)"]
     run = model.index(0, NAME, scan)
     assert model.rowCount(run) == 6
     assert model.index(1, NAME, run).data() == "Pipe 2"

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtWidgets import QApplication
 
-from pipegui import commands
+from pipegui import commands, cuts
 from pipegui.document import Document, ProfileKey, Scan, Selection
 from pipegui.plots.deviation_map import DeviationMap
 from pipegui.plots.radius_plot import RadiusPlot
@@ -304,3 +305,39 @@ def test_that_what_is_not_wanted_is_not_drawn(radius):
     assert radius.offset.isVisible()
     radius.shown["centre"].setChecked(False)
     assert not radius.offset.isVisible()
+
+
+# The cursor of one view in the other
+
+
+def test_that_hovering_the_map_tells_the_spot_and_leaving_it_nothing(qtbot):
+    plot = shown(qtbot, DeviationMap(), states(Selection(1, 2)).map)
+    with qtbot.waitSignal(plot.spot_hovered, check_params_cb=lambda place: place is not None):
+        hover(qtbot, plot, at(plot, plot.plot, 0.8, 40))
+    told = []
+    plot.spot_hovered.connect(told.append)
+    hover(qtbot, plot, at(plot, plot.plot, 1.0, -60))
+    chainage, clock = told[-1]
+    assert chainage == pytest.approx(1.0, abs=0.02)
+    assert np.rad2deg(clock) == pytest.approx(300, abs=3)
+    QApplication.sendEvent(plot, QEvent(QEvent.Type.Leave))
+    assert told[-1] is None
+
+
+def test_that_the_map_shows_the_cursor_of_the_3d_view(qtbot):
+    plot = shown(qtbot, DeviationMap(), states(Selection(1, 2)).map)
+    plot.show_cursor((0.8, np.deg2rad(300)))
+    assert plot._cursor.getData()[0] == pytest.approx([0.8])
+    assert plot._cursor.getData()[1] == pytest.approx([-60])
+    plot.show_cursor(None)
+    assert len(plot._cursor.getData()[0]) == 0
+
+
+def test_that_a_spot_on_the_surface_and_its_point_are_one():
+    index = int(np.flatnonzero(RESULT.element_id == 2)[17])
+    chainage, clock = cuts.spot_of_point(CLOUD, RESULT, 2, index)
+    spot = cuts.spot_on_surface(RESULT, 2, chainage, clock)
+    off = np.linalg.norm(spot - CLOUD.xyz[index])
+    assert off == pytest.approx(abs(RESULT.deviation[index]), abs=2e-3)
+    assert cuts.spot_of_point(CLOUD, RESULT, 9, index) is None
+    assert cuts.spot_of_point(CLOUD, RESULT, 2, -1) is None

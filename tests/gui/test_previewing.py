@@ -13,9 +13,10 @@ from pipegui import commands
 from pipegui.document import Document, Measurement, Scan, Tool
 from pipegui.jobs import Jobs
 from pipegui.panels.stacks_panel import NAME, PROFILES, SHARE, StacksPanel
+from pipegui.plan_state import PlanState, PreviewState
 from pipegui.plots.preview_view import PreviewView, summary_of, upright
 from pipegui.previewing import Previews
-from pipegui.view_state import PlanState, PreviewState, resolve
+from pipegui.view_state import resolve
 from tests.factories import make_cloud
 
 LEFT = Qt.MouseButton.LeftButton

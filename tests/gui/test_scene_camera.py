@@ -144,7 +144,7 @@ def test_that_the_kernel_finds_the_same_points_as_its_plain_twin(pose, rng):
 def test_that_the_kernel_runs_the_same_compiled_and_plain(pose, rng):
     xyz = pose.focus + rng.uniform(-0.1, 0.1, (2000, 3))
     args = xyz, projection_of(pose), (400.0, 300.0), 80.0
-    compiled, plain = points_near(*args), points_near(*args, kernel=_find_near.py_func)
+    compiled, plain = points_near(*args), points_near(*args, kernel=_find_near)
     assert len(plain[0]) > 1024  # more than there is room for at first
     for fast, slow in zip(compiled, plain, strict=True):
         assert fast == pytest.approx(slow)

@@ -239,7 +239,7 @@ def test_that_the_first_points_are_spread_over_all_of_the_cloud():
     assert len(np.unique(np.diff(np.sort(first)))) > 500
 
 
-def test_that_a_profile_holds_the_points_of_its_slab_and_colours_them_by_segment():
+def test_that_a_profile_holds_the_points_of_its_slab_and_colours_them_by_element():
     stack = RESULT.stacks[0]
     rows = profile_rows(CLOUD, stack, 40)
     expected = np.flatnonzero(stack.profile_index(CLOUD.xyz) == 40)
@@ -247,8 +247,10 @@ def test_that_a_profile_holds_the_points_of_its_slab_and_colours_them_by_segment
     assert len(np.setxor1d(rows, expected)) <= 2
     assert len(rows) > 20
     colours = profile_colours(CLOUD, RESULT, rows)
-    for segment in np.unique(RESULT.segment_id[rows]):
-        assert len(np.unique(colours[RESULT.segment_id[rows] == segment], axis=0)) == 1
+    ids = RESULT.element_id[rows]
+    for element in np.unique(ids):
+        assert len(np.unique(colours[ids == element], axis=0)) == 1
+    assert len(np.unique(colours, axis=0)) > 2
 
 
 def test_that_all_else_is_muted_where_one_profile_is_shown():

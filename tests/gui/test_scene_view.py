@@ -8,6 +8,7 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
+from pipecore.types import PointCloud
 from pipegui.document import (
     Background,
     Box,
@@ -179,7 +180,7 @@ def test_that_fewer_points_are_drawn_while_moving_and_all_at_rest(qtbot, no_leak
     view.apply(scene_state(cloud=cloud, result=result))
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
-    view.points._seconds_per_point = 1e-5  # as on a slow machine
+    view.points.seconds_per_point = 1e-5  # as on a slow machine
     with qtbot.waitSignal(view.canvas.drawn):
         view.set_standard_view("top")
     assert view.points.n_shown < 60_000
@@ -352,3 +353,31 @@ def test_that_points_outside_the_clip_box_are_neither_drawn_nor_picked(scene, qt
     with qtbot.waitSignal(scene.picked) as picked:
         qtbot.mouseClick(scene.canvas, LEFT, pos=position)
     assert picked.args[0] != index
+
+
+# While a scan is read
+
+
+def test_that_parts_of_a_scan_are_seen_while_it_is_read(qtbot, no_leaks):
+    view = SceneView()
+    qtbot.addWidget(view)
+    view.resize(320, 240)
+    with qtbot.waitExposed(view):
+        view.show()
+    background = picture(view)
+    half = len(CLOUD) // 2
+    for start in (0, half):
+        at = slice(start, start + half)
+        view.glimpse(PointCloud(CLOUD.origin, CLOUD.xyz[at], rgb=CLOUD.rgb[at]))
+        with qtbot.waitSignal(view.canvas.drawn):
+            view.canvas.draw()
+    seen = np.abs(picture(view) - background).max(axis=2) > 25
+    assert seen.mean() > 0.03
+    pixels, _ = view.canvas.projection().to_screen(CLOUD.xyz.astype(float))
+    assert ((pixels > 0) & (pixels < [320, 240])).all(axis=1).mean() > 0.99
+    view.end_glimpse()
+    view.apply(scene_state())
+    settle(qtbot, view)
+    assert len(view._glimpse) == 0
+    assert view.points.n_shown > 0
+    view.close()

@@ -1,8 +1,15 @@
 """The bars below the 3D view: the clip box in numbers, the profiles one by one."""
 
+import threading
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+
+from pipecore.types import PointCloud
+from tests.factories import make_cloud
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -72,3 +79,39 @@ def test_that_slider_buttons_and_keys_go_from_profile_to_profile(sliced, qtbot):
     assert scene.state.view.shown_profile == indices[-1]
     qtbot.mouseClick(bar.all, LEFT)
     assert scene.state.view.shown_profile is None
+
+
+def test_that_a_scan_is_seen_while_it_is_read(make_window, qtbot):
+    go_on, cloud = threading.Event(), make_cloud()
+    part = PointCloud(cloud.origin, cloud.xyz[:100])
+
+    def read(path, settings, progress):
+        progress.look(part)
+        assert go_on.wait(10)
+        return cloud
+
+    window = make_window(read=read)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: window.parts.scene.glimpses == [part])
+    assert window.centre.currentWidget() is window.parts.scene
+    go_on.set()
+    qtbot.waitUntil(lambda: window.document.scan is not None)
+    assert window.parts.scene.glimpses == [part, None]
+
+
+def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_window, qtbot):
+    cloud = make_cloud()
+
+    def read(path, settings, progress):
+        progress.look(cloud)
+        for _ in range(1000):
+            progress.update("reading", 0.1)
+            time.sleep(0.01)
+        return cloud
+
+    window = make_window(read=read)
+    window.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: len(window.parts.scene.glimpses) == 1)
+    window.jobs.cancel()
+    qtbot.waitUntil(lambda: window.centre.currentWidget() is window.panels.welcome)
+    assert window.parts.scene.glimpses[-1] is None

@@ -66,7 +66,7 @@ def test_that_after_opening_the_cloud_is_shown_and_detect_is_lit(window, qtbot):
     assert window.parts.scene.isVisible()
     assert window.parts.scene.state.cloud is make_cloud()
     assert window.actions_["detect"].isEnabled()
-    assert window.windowTitle() == "plant.laz – PipeGUI"
+    assert window.windowTitle() == "plant.laz[*] – PipeGUI"
     assert "20 k points" in window.status.scan.text()
 
 
@@ -580,3 +580,20 @@ def test_that_the_plots_are_headed_by_what_they_show(detected):
     assert dock.windowTitle() == "Pipe 2 · dent 1"
     detected.parts.scene.picked.emit(-1)
     assert dock.windowTitle() == "Element"
+
+
+def test_that_the_cursor_on_the_map_is_marked_in_3d_and_the_other_way_round(detected):
+    from pipegui import commands
+
+    detected.do(commands.select_element, 2)
+    scan, parts = detected.document.scan, detected.parts
+    parts.map.spot_hovered.emit((0.8, 0.5))
+    distance = scan.result.element(2).axis.pipe_coordinates(parts.scene.spot[None])
+    assert [float(v[0]) for v in distance] == pytest.approx([0.8, 0.08415, 0.5], abs=1e-4)
+    parts.map.spot_hovered.emit(None)
+    assert parts.scene.spot is None
+    on_it = int(np.flatnonzero(scan.result.element_id == 2)[0])
+    parts.scene.hovered.emit(on_it)
+    assert parts.map.cursor is not None
+    parts.scene.hovered.emit(int(np.flatnonzero(scan.result.element_id == 9)[0]))
+    assert parts.map.cursor is None

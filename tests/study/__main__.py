@@ -1,4 +1,4 @@
-"""How accurate the detection is: `python -m tests.study [fits pipes plants one-station pump]`.
+"""How accurate the detection is: `python -m tests.study [SECTION ...]`.
 
 Measures on simulated scans with known truth and writes `docs/accuracy.md`, each section
 apart. What has been measured is kept in out/study for the same sources, so that a run that
@@ -9,10 +9,10 @@ import argparse
 import shlex
 import sys
 
-from tests.study import fits, pipes, plants, pump
+from tests.study import deformations, fits, pipes, plants, pump
 from tests.study.store import put_section, sources_digest
 
-SECTIONS = ("fits", "pipes", "plants", "one-station", "pump")
+SECTIONS = ("fits", "pipes", "plants", "one-station", "deformations", "pump")
 
 
 def main() -> None:
@@ -37,6 +37,8 @@ def main() -> None:
             text = fits.write(args.quick)
         elif section == "pipes":
             text = pipes.write(args.quick)
+        elif section == "deformations":
+            text = deformations.write(args.quick)
         elif section == "plants":
             text = plants.write(4, args.first_seed, n_plants)
         elif section == "pump":

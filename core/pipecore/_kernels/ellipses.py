@@ -107,6 +107,31 @@ def pick_pair(normals, free, state):
     return state, -1, -1
 
 
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def turn_on_circle(us, vs, nus, nvs, nds, tu, tv, ad, sin, cx, cy, r, slack, cos_radial):
+    """How far the normals of the points on a circle turn, in points.
+
+    Points count as far as their normals turn: a floor would lie on any large circle. Seen
+    along an axis as `look_along` does, tilted by `sin` towards (tu, tv); added up in lanes
+    side by side.
+    """
+    count = cos2 = sin2 = 0.0
+    for k in range(us.shape[0]):
+        dx = tu * vs[k] - tv * us[k] - cx
+        dy = (tu * us[k] + tv * vs[k]) * ad - cy
+        mx = tu * nvs[k] - tv * nus[k]
+        my = (tu * nus[k] + tv * nvs[k]) * ad - nds[k] * sin
+        d2 = dx * dx + dy * dy
+        d = math.sqrt(d2)
+        is_on = (abs(d - r) <= slack) & (abs(dx * mx + dy * my) >= cos_radial * d)
+        w = 1.0 if is_on else 0.0
+        share = w / max(d2, 1e-300)
+        count += w
+        cos2 += share * (dx * dx - dy * dy)
+        sin2 += share * (2.0 * dx * dy)
+    return count - math.sqrt(cos2 * cos2 + sin2 * sin2)
+
+
 @njit(cache=True, nogil=True)
 def best_circle(
     uv, normals, free, tolerance, cos_radial, min_cos_tilt, max_radius, n_trials, seed, inliers
@@ -117,8 +142,20 @@ def best_circle(
     along it, a centre (where the normals meet). Writes the inliers, returns their number.
     """
     n = uv.shape[0]
-    x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    weights = np.empty(n)
+    # The free points side by side, for the many trials.
+    table, n_free = np.empty((5, n)), 0
+    for k in range(n):
+        if free[k]:
+            table[0, n_free], table[1, n_free] = uv[k, 0], uv[k, 1]
+            table[2, n_free], table[3, n_free] = normals[k, 0], normals[k, 1]
+            table[4, n_free] = normals[k, 2]
+            n_free += 1
+    us, vs, nus, nvs, nds = (
+        table[0, :n_free], table[1, :n_free], table[2, :n_free], table[3, :n_free],
+        table[4, :n_free],
+    )  # fmt: skip
+    pair_uv, pair_normals = np.empty((2, 2)), np.empty((2, 3))
+    px, py, pmx, pmy = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
     best_turn = 0.0
     best_au = best_av = best_ad = best_cx = best_cy = best_r = 0.0
     state = np.uint64(seed) * np.uint64(2862933555777941757) + np.uint64(3037000493)
@@ -135,33 +172,34 @@ def best_circle(
         au, av, ad = au / length, av / length, ad / length
         if ad < min_cos_tilt:
             continue
-        look_along(uv, normals, au, av, ad, x, y, mx, my)
-        sin = mx[i] * my[j] - my[i] * mx[j]
+        for m in range(2):
+            k = i if m == 0 else j
+            pair_uv[m, 0], pair_uv[m, 1] = uv[k, 0], uv[k, 1]
+            for axis in range(3):
+                pair_normals[m, axis] = normals[k, axis]
+        tu, tv = look_along(pair_uv, pair_normals, au, av, ad, px, py, pmx, pmy)
+        sin = pmx[0] * pmy[1] - pmy[0] * pmx[1]
         if abs(sin) < 0.2:
             continue
-        t = ((x[j] - x[i]) * my[j] - (y[j] - y[i]) * mx[j]) / sin
-        cx, cy = x[i] + t * mx[i], y[i] + t * my[i]
-        r1, r2 = abs(t), math.sqrt((x[j] - cx) ** 2 + (y[j] - cy) ** 2)
+        t = ((px[1] - px[0]) * pmy[1] - (py[1] - py[0]) * pmx[1]) / sin
+        cx, cy = px[0] + t * pmx[0], py[0] + t * pmy[0]
+        r1, r2 = abs(t), math.sqrt((px[1] - cx) ** 2 + (py[1] - cy) ** 2)
         r = 0.5 * (r1 + r2)
         if abs(r1 - r2) > 0.25 * r or r > max_radius or r < tolerance:
             continue
         slack = tolerance + min(0.05 * r, 2.0 * tolerance)
-        # Points count as far as their normals turn: a floor would lie on any large circle.
-        count = cos2 = sin2 = 0.0
-        for k in range(n):
-            if free[k] and fits_circle(x[k], y[k], mx[k], my[k], cx, cy, r, slack, cos_radial):
-                count += 1.0
-                dx, dy = x[k] - cx, y[k] - cy
-                d2 = dx * dx + dy * dy
-                cos2 += (dx * dx - dy * dy) / d2
-                sin2 += 2.0 * dx * dy / d2
-        turn = count - math.sqrt(cos2 * cos2 + sin2 * sin2)
+        turn = turn_on_circle(
+            us, vs, nus, nvs, nds, tu, tv, ad, math.sqrt(au * au + av * av), cx, cy, r,
+            slack, cos_radial,
+        )  # fmt: skip
         if turn > best_turn:
             best_turn, best_cx, best_cy, best_r = turn, cx, cy, r
             best_au, best_av, best_ad = au, av, ad
     if best_turn == 0.0:
         return 0
     au, av, ad, cx, cy, r = best_au, best_av, best_ad, best_cx, best_cy, best_r
+    x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    weights = np.empty(n)
     for pass_ in range(3):
         look_along(uv, normals, au, av, ad, x, y, mx, my)
         if pass_ > 0:

@@ -8,14 +8,15 @@ from numba import njit
 from pipecore._kernels.eigen import eigenvalues, eigenvector
 from pipecore._kernels.voxels import EMPTY, slot_of
 
+LANES = 16
+FAR_OFF = 1e30
+
 
 @njit(cache=True, nogil=True)
 def fit_planes(
     xyz,
     cell_keys,
     cell_starts,
-    table_keys,
-    table_ids,
     n_y,
     n_z,
     radius,
@@ -34,13 +35,14 @@ def fit_planes(
     normal, the root mean square distance from the plane, and the spacing of the points;
     nan where there are too few.
     """
-    mask = np.int64(table_keys.shape[0] - 1)
-    first, last = np.empty(729, np.int64), np.empty(729, np.int64)
+    first, last = np.empty(81, np.int64), np.empty(81, np.int64)
+    begins = np.empty(9, np.int64)
+    for row in range(9):
+        step = (row // 3 - 1) * n_y + row % 3 - 1
+        begins[row] = np.searchsorted(cell_keys, cell_keys[start] + step * n_z - 1)
+    near = np.empty((3, 512))
     for c in range(start, stop):
-        n_ranges = list_ranges(
-            cell_keys[c], 1, cell_starts, table_keys, table_ids, mask, n_y, n_z, first, last
-        )
-        reach = 1
+        reach, n_near = 0, 0
         for i in range(cell_starts[c], cell_starts[c + 1]):
             px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             at = places[i]
@@ -48,28 +50,31 @@ def fit_planes(
             residuals[at] = spacings[at] = math.nan
             for quarters in (4, 5, 6, 7, 8, 10, 12, 16):
                 if reach != (quarters + 3) // 4:
+                    # Looked up once for all points of the cell, and copied side by side.
                     reach = (quarters + 3) // 4
                     n_ranges = list_ranges(
-                        cell_keys[c], reach, cell_starts, table_keys, table_ids, mask, n_y, n_z,
-                        first, last,
-                    )  # fmt: skip
+                        c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last
+                    )
+                    n_near = 0
+                    for k in range(n_ranges):
+                        n_near += last[k] - first[k]
+                    if n_near + LANES > near.shape[1]:
+                        near = np.empty((3, 2 * n_near + LANES))
+                    n_near = 0
+                    for k in range(n_ranges):
+                        for j in range(first[k], last[k]):
+                            near[0, n_near] = xyz[j, 0]
+                            near[1, n_near] = xyz[j, 1]
+                            near[2, n_near] = xyz[j, 2]
+                            n_near += 1
+                    # Whole lanes; what fills them is out of reach.
+                    while n_near % LANES > 0:
+                        near[0, n_near] = near[1, n_near] = near[2, n_near] = FAR_OFF
+                        n_near += 1
                 r2 = (0.25 * quarters * radius) ** 2
-                n = 0
-                sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
-                for k in range(n_ranges):
-                    for j in range(first[k], last[k]):
-                        x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
-                        if x * x + y * y + z * z <= r2:
-                            n += 1
-                            sx += x
-                            sy += y
-                            sz += z
-                            sxx += x * x
-                            sxy += x * y
-                            sxz += x * z
-                            syy += y * y
-                            syz += y * z
-                            szz += z * z
+                n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz = sums_within(
+                    near[0, :n_near], near[1, :n_near], near[2, :n_near], px, py, pz, r2
+                )
                 if n >= min_neighbours:
                     mx, my, mz = sx / n, sy / n, sz / n
                     xx, xy, xz = sxx / n - mx * mx, sxy / n - mx * my, sxz / n - mx * mz
@@ -82,26 +87,56 @@ def fit_planes(
                     break
 
 
-@njit(cache=True, nogil=True)
-def list_ranges(key, reach, cell_starts, table_keys, table_ids, mask, n_y, n_z, first, last):
-    """List the ranges of points of the cells within `reach` of a cell; return their number.
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def sums_within(xs, ys, zs, px, py, pz, r2):
+    """Count, sums and sums of products of the points within reach of one, relative to it.
 
-    Ranges that follow each other are one.
+    Added up in lanes side by side: several times as fast as one after the other.
+    """
+    n = sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
+    for j in range(xs.shape[0]):
+        x, y, z = xs[j] - px, ys[j] - py, zs[j] - pz
+        w = 1.0 if x * x + y * y + z * z <= r2 else 0.0
+        wx, wy, wz = w * x, w * y, w * z
+        n += w
+        sx += wx
+        sy += wy
+        sz += wz
+        sxx += wx * x
+        sxy += wx * y
+        sxz += wx * z
+        syy += wy * y
+        syz += wy * z
+        szz += wz * z
+    return n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz
+
+
+@njit(cache=True, nogil=True)
+def list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last):
+    """List the ranges of points of the cells within `reach` of cell `c`; return their number.
+
+    Cells are numbered row by row, so that those of a row lie side by side. Where the rows
+    of the next cells begin is kept in `begins` from call to call, which are made for rising
+    cells; wider reaches are rare and searched for.
     """
     n = 0
     for dx in range(-reach, reach + 1):
         for dy in range(-reach, reach + 1):
-            for dz in range(-reach, reach + 1):
-                near = key + (dx * n_y + dy) * n_z + dz
-                slot = slot_of(near, table_keys, mask)
-                if table_keys[slot] == EMPTY:
-                    continue
-                c = table_ids[slot]
-                if n > 0 and last[n - 1] == cell_starts[c]:
-                    last[n - 1] = cell_starts[c + 1]
-                else:
-                    first[n], last[n] = cell_starts[c], cell_starts[c + 1]
-                    n += 1
+            low = cell_keys[c] + (dx * n_y + dy) * n_z - reach
+            if reach == 1:
+                row = 3 * dx + dy + 4
+                begin = begins[row]
+                while begin < cell_keys.shape[0] and cell_keys[begin] < low:
+                    begin += 1
+                begins[row] = begin
+            else:
+                begin = np.searchsorted(cell_keys, low)
+            end = begin
+            while end < cell_keys.shape[0] and cell_keys[end] <= low + 2 * reach:
+                end += 1
+            if end > begin:
+                first[n], last[n] = cell_starts[begin], cell_starts[end]
+                n += 1
     return n
 
 

@@ -2,8 +2,10 @@
 
 The bump is h·b(ρ) + c over an ellipse, where ρ is the distance from its peak in shares of
 half its length and half its width, and c is what the contour may be off by. Its section
-b is a cosine, cos²(π/2 · ρᑫ), plain for q = 1, flat-bottomed above, or a cone, 1 - ρ:
-whichever fits best by AIC where the bump is clear, else the plain cosine.
+b is a cosine, cos²(π/2 · ρᑫ), plain for q = 1 and flat-bottomed above, or the frustum of a
+cone whose flat top may be a point. Which of them it is, a scan tells of deep dents only: the
+depth is the mean of theirs, each weighted by how likely it is (AIC), and that they differ
+is part of its uncertainty. The extents are those of the likeliest.
 Length and width are where the bump has come back to zero, so that a cosine bump of
 nominal extent has just that extent.
 """
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from pipecore._kernels import bumps as kernels
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
@@ -24,24 +27,35 @@ MIN_EXTENT, MAX_LENGTH, MAX_WIDTH = 0.1, 3.0, 1.5
 TYPICAL_EXTENT, EXTENT_PRIOR = 0.5, 1.0
 """Extents believed in beforehand (shares of the diameter), and the sd of their logarithms."""
 
-CLEAR = 20.0
-"""Significance from which the form is fitted as well (flat-bottomed, pointed)."""
+CLEAR = 6.0
+"""Significance from which other forms are fitted as well (flat-bottomed, pointed)."""
 
 CORE = 0.75
 """Where the fit is held against its points: up to this share of the half extents."""
 
+PEAK, PEAK_POINTS = 0.5, 2
+"""Points within this share of the half extents that have to show how high a bump is."""
+
 HEIGHT_PRIOR = 0.5
 """Standard deviation of heights believed in beforehand, share of the diameter."""
 
-FORM_HANDICAP = 4.0
+FORM_HANDICAP = 2.0
 """How much better than a plain cosine another form has to fit."""
 
-FORM_PRIOR, ROUNDNESS_PRIOR = 0.4, 0.5
-"""Weak beliefs: standard deviations of log q around 0, and of log(length / width) around 0."""
+ROUNDNESS_PRIOR = 0.5
+"""Weak belief: standard deviation of log(length / width) around 0."""
 
 
-Shape = Callable[[Array, float], Array]
-"""Height of a bump of height one at ρ, given q."""
+@dataclass(frozen=True)
+class Form:
+    """A family of sections: height at ρ given q, and the sd of log q around 0 believed in.
+
+    `number` is how the kernels name it.
+    """
+
+    number: int
+    section: Callable[[Array, float], Array]
+    prior: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +66,8 @@ class Bump:
     the magnitudes of the second derivatives at the peak of the cosine (1/metres). `misfit`
     is the root mean square of the residuals under it in units of their noise, `noise` the
     standard deviation of the height of a bump whose place and form are known. `volume`
-    (metres³, positive) lies between the bump and the undeformed surface.
+    (metres³, positive) lies between the bump and the undeformed surface. Where no points
+    lie near the peak (`is_peak_seen`), the height is no more than a guess.
     """
 
     along: float
@@ -67,6 +82,7 @@ class Bump:
     noise: float
     n_points: int
     volume: float
+    is_peak_seen: bool
 
     @property
     def area(self) -> float:
@@ -81,7 +97,7 @@ class _Fit:
     parameters: Array
     covariance: Array
     chi2: float
-    shape: Shape
+    form: Form
 
     @property
     def exponent(self) -> float:
@@ -92,12 +108,12 @@ class _Fit:
     def mean_share(self) -> float:
         """Mean height over the ellipse as a share of the peak's: ∫ 2ρ b(ρ) dρ."""
         rho = (np.arange(200) + 0.5) / 200
-        return float(np.mean(2 * rho * self.shape(rho, self.exponent)))
+        return float(np.mean(2 * rho * self.form.section(rho, self.exponent)))
 
     @property
     def aic(self) -> float:
         """Akaike's criterion, with the handicap of the less common forms."""
-        is_plain = self.shape is bump_shape and len(self.parameters) == 6
+        is_plain = self.form is BELL and len(self.parameters) == 6
         return self.chi2 + 2 * len(self.parameters) + (0.0 if is_plain else FORM_HANDICAP)
 
 
@@ -143,13 +159,17 @@ def fit_bump(
     fits = [plain]
     if abs(first[0]) > CLEAR * _height_sd((data[0], data[1], data[3]), length, width):
         fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd))
-        fits.append(_fit(data, first, diameter, contour_sd, cone))
+        fits.append(_fit(data, first, diameter, contour_sd, CONE))
+        fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd, FRUSTUM))
     best = min(fits, key=lambda fit: fit.aic)
     # That it may be another form is part of the uncertainty of the height.
     likely = np.exp(-0.5 * (np.array([fit.aic for fit in fits]) - best.aic))
-    others = np.array([fit.parameters[0] for fit in fits]) - best.parameters[0]
-    doubt = float(likely @ others**2 / likely.sum())
-    height, along_peak, around_peak = best.parameters[:3]
+    likely /= likely.sum()
+    heights = np.array([fit.parameters[0] for fit in fits])
+    height = float(likely @ heights)
+    variance = likely @ [float(fit.covariance[0, 0]) for fit in fits]
+    doubt = float(likely @ (heights - height) ** 2)
+    along_peak, around_peak = best.parameters[1:3]
     length, width = np.exp(best.parameters[3:5])
     misfit = _core_misfit(data, best)
     inside = np.hypot(2 * (along - along_peak) / length, 2 * (around - around_peak) / width)
@@ -159,7 +179,7 @@ def fit_bump(
         along=float(along_peak),
         around=float(around_peak),
         height=float(height),
-        height_sd=float(np.sqrt(best.covariance[0, 0] * max(misfit, 1.0) ** 2 + doubt)),
+        height_sd=float(np.sqrt(variance * max(misfit, 1.0) ** 2 + doubt)),
         length=float(length),
         width=float(width),
         curvature_along=float(second[0]),
@@ -170,6 +190,7 @@ def fit_bump(
         ),
         n_points=int(np.count_nonzero(inside < 1)),
         volume=float(abs(height) * np.pi / 4 * length * width * best.mean_share),
+        is_peak_seen=bool(np.count_nonzero(inside < PEAK) >= PEAK_POINTS),
     )
 
 
@@ -184,6 +205,16 @@ def cone(rho: Array, _q: float = 1.0) -> Array:
     return np.asarray(1.0 - np.minimum(rho, 1.0))
 
 
+def frustum(rho: Array, q: float = 1.0) -> Array:
+    """Values of a bump with straight flanks that is flat up to ρ = q / (1 + q)."""
+    return np.asarray(np.clip((1.0 - rho) * (1.0 + q), 0.0, 1.0))
+
+
+BELL = Form(kernels.BELL, bump_shape, 0.4)
+CONE = Form(kernels.CONE, cone, 0.4)
+FRUSTUM = Form(kernels.FRUSTUM, frustum, 0.7)
+
+
 def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     """Root mean square of the residuals under the bump, in units of the noise."""
     along, around, deviation, noise = data
@@ -192,7 +223,7 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     core = rho < CORE
     if np.count_nonzero(core) < 3:
         return np.inf
-    model = p[0] * fit.shape(rho, fit.exponent) + p[5]
+    model = p[0] * fit.form.section(rho, fit.exponent) + p[5]
     residual = (deviation - model)[core] / noise[core]
     return float(np.sqrt(np.mean(residual**2)))
 
@@ -209,39 +240,50 @@ def _fit(
     first: Array,
     diameter: float,
     contour_sd: float,
-    shape: Shape = bump_shape,
+    form: Form | None = None,
 ) -> _Fit:
+    form = form or BELL
     along, around, deviation, noise = data
-    extent_log = np.log(TYPICAL_EXTENT * diameter)
     slack = 0.3 * np.exp(first[3:5])
 
+    n, n_free = len(along), len(first)
+    # Beliefs are residuals too: (slopes · p - middle).
+    slopes = np.zeros((8, n_free))
+    slopes[0, 0] = 1.0 / (HEIGHT_PRIOR * diameter)
+    slopes[[1, 2], [1, 2]] = 1.0 / slack
+    slopes[[3, 4], [3, 4]] = 1.0 / EXTENT_PRIOR
+    slopes[5, 3:5] = 1.0 / ROUNDNESS_PRIOR, -1.0 / ROUNDNESS_PRIOR
+    slopes[6, 5] = 1.0 / max(contour_sd, 1e-5)
+    slopes[7, 6:] = 1.0 / form.prior
+    middle = np.zeros(8)
+    middle[3:5] = np.log(TYPICAL_EXTENT * diameter) / EXTENT_PRIOR
+
     def residuals(p: Array) -> Array:
-        q = float(np.exp(p[6])) if len(p) > 6 else 1.0
-        u, v = 2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4])
-        model = p[0] * shape(np.hypot(u, v), q) + p[5]
-        beliefs = [
-            p[0] / (HEIGHT_PRIOR * diameter),
-            *(p[1:3] / slack),
-            *((p[3:5] - extent_log) / EXTENT_PRIOR),
-            (p[3] - p[4]) / ROUNDNESS_PRIOR,
-            p[5] / max(contour_sd, 1e-5),
-            np.log(q) / FORM_PRIOR,
-        ]
-        return np.concatenate([(deviation - model) / noise, np.asarray(beliefs)])
+        result = np.empty(n + len(slopes))
+        kernels.residuals(form.number, p, along, around, deviation, noise, result[:n])
+        result[n:] = slopes @ p - middle
+        return result
+
+    def jacobian(p: Array) -> Array:
+        result = np.empty((n + len(slopes), n_free))
+        kernels.derivatives(form.number, p, along, around, noise, result[:n])
+        result[n:] = slopes
+        return result
 
     scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
+
     answer = least_squares(
         residuals,
         first,
+        jacobian,
         method="lm",
         x_scale=scale,
-        diff_step=1e-5,
-        max_nfev=400,
+        max_nfev=60,
         ftol=1e-5,
         xtol=1e-5,
     )
     information = answer.jac.T @ answer.jac
-    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost), shape)
+    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost), form)
 
 
 def _thin(

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipecore.deformation.deviation_map import Grid
 from pipecore.deformation.reference import Contour, inner_rows
 from pipecore.geometry import Array
 
@@ -12,6 +13,12 @@ KINK_ADVANTAGE = 20.0
 
 MAX_KINK_SHARE = 0.6
 """The same as a share: where both fit badly, neither is the better."""
+
+CENTRE_KNOTS = 1.5
+"""Diameters between the knots of the contour that the line of centres is taken from."""
+
+ROUNDED = 0.75
+"""Diameters to either side of a kink over which the smooth contour rounds it."""
 
 MIN_KINK = np.deg2rad(0.3)
 MIN_BOW_RATIO = 0.001
@@ -52,10 +59,10 @@ def measure_centre_line(contour: Contour) -> CentreLine:
     variance = [max(float(side @ covariance[i] @ side), LEAST_SD**2) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
-    shape = _shape_of(s, deviation @ side, covariance, side)
+    shape = _shape_of(s, deviation @ side, covariance, side, contour.grid)
     if shape.kink is not None:
-        # The contour is smooth and rounds the corner; the two straight pieces do not.
-        return CentreLine(shape.kink[1], float(sd), shape.kink[0], clock, True, shape.explained)
+        knee, sag, sag_sd = shape.kink
+        return CentreLine(sag, max(sag_sd, float(sd)), knee, clock, True, shape.explained)
     return CentreLine(
         float(distance[peak]), float(sd), float(s[peak]), clock, False, shape.explained
     )
@@ -71,14 +78,14 @@ class _Shape:
     """How much of the line's variation a bow or a kink explains, and the kink if it is one."""
 
     explained: float
-    kink: tuple[float, float] | None
+    kink: tuple[float, float, float] | None
 
 
-def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shape:
+def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array, grid: Grid) -> _Shape:
     """Compare the line of centres with smooth bows and with two straight pieces.
 
     The bows are those of a beam under an even load however its ends are held, and of
-    parts of one: curves of the fourth degree. The kink is given as chainage and sag.
+    parts of one: curves of the fourth degree. The kink is given as chainage, sag and its deviation.
     """
     step = max(1, len(s) // 40)
     s, lateral = s[::step], lateral[::step]
@@ -104,4 +111,32 @@ def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array) -> _Shap
     length = float(s[-1] - s[0])
     if best + KINK_ADVANTAGE > smooth or best > MAX_KINK_SHARE * smooth or turn / length < MIN_KINK:
         return _Shape(explained, None)
-    return _Shape(explained, (float(s[0]) + where * length, turn * where * (1 - where)))
+    knee = float(s[0]) + where * length
+    return _Shape(explained, _measure_kink(s, lateral, sd, knee, turn / length, grid))
+
+
+def _measure_kink(
+    s: Array, lateral: Array, sd: Array, knee: float, turn: float, grid: Grid
+) -> tuple[float, float, float]:
+    """Chainage of a kink, its sag from end to end of the element, and the sag's deviation.
+
+    The contour is smooth and rounds the corner: the two straight pieces are measured away
+    from it, where they are long enough. `turn` is what they turn by if they are not.
+    """
+    away = np.abs(s - knee) > ROUNDED * 2 * grid.radius
+    sides = [np.flatnonzero(away & (s < knee)), np.flatnonzero(away & (s > knee))]
+    if min(map(len, sides)) < 4:
+        sides = [np.flatnonzero(s < knee), np.flatnonzero(s > knee)]
+    else:
+        rows = np.concatenate(sides)
+        design = np.stack([np.ones_like(s), s, np.maximum(s - knee, 0)], axis=1) / sd[:, None]
+        solution, *_ = np.linalg.lstsq(design[rows], (lateral / sd)[rows], rcond=None)
+        turn = abs(float(solution[2]))
+    variance = 0.0
+    for side in sides:
+        span = float(np.ptp(s[side]))
+        # Rows within a knot's distance share their noise.
+        n_apart = max(2.0, span / (CENTRE_KNOTS * 2 * grid.radius))
+        variance += 12 * float(np.mean(sd[side] ** 2)) / (n_apart * span**2)
+    arm = knee * (grid.length - knee) / grid.length
+    return knee, turn * arm, float(np.sqrt(variance)) * arm

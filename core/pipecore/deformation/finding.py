@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.deformation.bump import Bump
-from pipecore.deformation.centre_line import MIN_BOW_RATIO, measure_centre_line
+from pipecore.deformation.centre_line import CENTRE_KNOTS, MIN_BOW_RATIO, measure_centre_line
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
 from pipecore.deformation.patches import Patch, find_patches
@@ -29,6 +29,9 @@ SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
 """Kinds whose contour is known well enough to look for deformations."""
 
 STRAIN_SIGNIFICANCE = 5.0
+
+MIN_DEPTH_SD = 3.0
+"""A depth has to be this many times its standard deviation."""
 
 MIN_BOW_LENGTH = 6.0
 """In diameters: the line of a shorter stub hangs on what touches it."""
@@ -123,9 +126,12 @@ def find_deformations(
         stretches = oval_stretches(contour, min_ovality)
         patches = [p for p in patches if not _is_of_ovality(p, stretches, surface.grid)]
 
-    deformations = [_as_deformation(element, surface, contour, p, settings) for p in patches]
     least = settings.min_depth_mm / 1000
-    deformations = [d for d in deformations if d.depth >= max(least, 3 * d.depth_sd)]
+    deformations = [
+        _as_deformation(element, surface, contour, p, settings)
+        for p in patches
+        if abs(p.bump.height) >= max(least, MIN_DEPTH_SD * p.bump.height_sd)
+    ]
     ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
     deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
     straightness, why_not_straight = np.nan, ""
@@ -206,6 +212,8 @@ def _as_deformation(
     radius = float(element.radius_at(patch.chainage))
     inside = patch.cells(grid).ravel()[surface.cell] & surface.belongs
     strain, why = _strain(bump, radius, settings.wall_thickness_mm / 1000)
+    if not bump.is_peak_seen:
+        why = dict.fromkeys(("depth", "volume", *why), "too few points at its peak")
     return Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
@@ -215,15 +223,15 @@ def _as_deformation(
         chainage_end=min(patch.chainage + patch.span / 2, element.axis.length),
         clock=patch.clock,
         peak=_peak(element, contour, patch.chainage, patch.clock, bump.height),
-        depth=depth,
-        depth_sd=bump.height_sd,
+        depth=depth if bump.is_peak_seen else np.nan,
+        depth_sd=bump.height_sd if bump.is_peak_seen else np.nan,
         length=bump.length,
         width=bump.width,
-        strain=strain,
+        strain=strain if bump.is_peak_seen else np.nan,
         n_points=int(np.count_nonzero(inside)),
         significance=abs(patch.z),
         area=bump.area,
-        volume=bump.volume,
+        volume=bump.volume if bump.is_peak_seen else np.nan,
         not_measurable=why,
     )
 
@@ -264,7 +272,7 @@ def _is_of_kink(found: Deformation, bow: list[Deformation], grid: Grid) -> bool:
     return any(
         line.kind is DeformationKind.KINK
         and abs(found.chainage - line.chainage) < 2 * grid.radius
-        and found.depth < 0.5 * line.depth
+        and not found.depth >= 0.5 * line.depth
         for line in bow
     )
 
@@ -311,7 +319,12 @@ def _measure_bow(
         used &= ~patch.cells(grid, 1.15)
     variance = np.where(used, heights.noise**2 / np.maximum(heights.count, 1), np.inf)
     contour = fit_contour(
-        grid, heights.deviation, variance, n_terms, knot_diameters=1.5, constant_radius=True
+        grid,
+        heights.deviation,
+        variance,
+        n_terms,
+        knot_diameters=CENTRE_KNOTS,
+        constant_radius=True,
     )
     line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)

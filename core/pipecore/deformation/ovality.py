@@ -10,7 +10,7 @@ from pipecore.geometry import Array
 MIN_ARC = np.deg2rad(200.0)
 """Below this the second harmonic cannot be told from a shift of the centre."""
 
-CLEAR = 4.0
+CLEAR = 6.0
 """A stretch is oval if its ovality is this many times its standard deviation."""
 
 

@@ -27,6 +27,9 @@ MIN_POINTS = 8
 RETURN = 0.4
 """Beyond a bump, the surface is back if it is closer to the contour than this share of it."""
 
+BULGE_FACTOR = 1.1
+"""A bulge has to be this much more significant than a dent: what touches a pipe looks like one."""
+
 MAX_MISFIT = 1.8
 """A bulge whose points lie further from its fit (in units of noise) is two surfaces."""
 
@@ -92,7 +95,8 @@ def find_patches(
     for seen in _candidates(cells, contour, MASKED_FROM * significance):
         if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 3:
             patch = _measure(element, surface, cells, contour, seen)
-            if patch is not None and abs(patch.z) >= significance and patch.is_enclosed:
+            least = significance * (BULGE_FACTOR if seen.height > 0 else 1.0)
+            if patch is not None and abs(patch.z) >= least and patch.is_enclosed:
                 patches.append(patch)
     return _without_overlap(patches), contour
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
 from pipecore.elements.ahead import refine_in_turn
+from pipecore.elements.corners import is_rounded_corner
 from pipecore.elements.fittings import (
     End,
     flanges,
@@ -206,6 +207,8 @@ class _Keeper:
         self, found: Fitted | None, between: tuple[End, End] | None = None
     ) -> None:
         if found is None or not is_credible(found, self._nearby, self._settings):
+            return
+        if is_rounded_corner(found, self._nearby):
             return
         if between is not None:
             self._joined.update(between)

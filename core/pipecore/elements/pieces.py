@@ -34,6 +34,8 @@ MOSTLY_STRAIGHT = 0.7
 """What is a bend only at its ends is a straight, such as a vessel between its heads."""
 MIN_SPHERE = 8
 """Ellipses cut off its centre that make a sphere."""
+SAME_CENTRE = 0.06
+"""Normals of a sphere's sections meet within this share of its radius."""
 MIN_TAPER = 0.04
 LONG_PIECE = 2.5
 """Straight pieces of this many radii come first: shorter ones may be part of a bend."""
@@ -60,6 +62,26 @@ class Piece:
     high: float = 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What of the ellipses makes pieces, one array per column."""
+
+    centre: Array
+    axis: Array
+    radius: Array
+    radius_sd: Array
+    width: Array
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> "_Rows":
+        return _Rows(
+            self.centre[rows],
+            self.axis[rows],
+            self.radius[rows],
+            self.radius_sd[rows],
+            self.width[rows],
+        )
+
+
 def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress) -> list[Piece]:
     """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
 
@@ -72,17 +94,20 @@ def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
     """
     pieces = find_spheres(ellipses)
     order = np.argsort(chain, kind="stable")
+    rows = _Rows(
+        ellipses.centre, ellipses.axis, ellipses.radius, ellipses.radius_sd, ellipses.width
+    )
     chains = np.split(order, np.flatnonzero(np.diff(chain[order])) + 1)
     for i, members in enumerate(chains):
         progress.update("elements", 0.3 * i / max(len(chains), 1))
         if len(members) < MIN_ELLIPSES:
             continue
-        pieces += _explain_chain(ellipses, members, progress)
+        pieces += _explain_chain(ellipses, rows, members, progress)
     return pieces
 
 
 def _explain_chain(
-    ellipses: Ellipses, members: NDArray[np.intp], progress: Progress
+    ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp], progress: Progress
 ) -> list[Piece]:
     pieces: list[Piece] = []
 
@@ -92,11 +117,11 @@ def _explain_chain(
         for piece in found:
             members = np.setdiff1d(members, piece.ellipses)
 
-    take(_take_lines(ellipses, members, LONG_PIECE))
-    take(_take_lines(ellipses, members, SHORT_PIECE, is_tapered=True))
+    take(_take_lines(rows, members, LONG_PIECE))
+    take(_take_lines(rows, members, SHORT_PIECE, is_tapered=True))
     for group in _reconnected(ellipses, members, progress):
-        take(_take_arcs(ellipses, group))
-    take(_take_lines(ellipses, members, SHORT_PIECE))
+        take(_take_arcs(rows, group))
+    take(_take_lines(rows, members, SHORT_PIECE))
     return pieces
 
 
@@ -111,7 +136,7 @@ def _reconnected(
 
 
 def _take_lines(
-    ellipses: Ellipses,
+    rows: _Rows,
     members: NDArray[np.intp],
     min_length: float,
     is_tapered: bool = False,
@@ -119,7 +144,7 @@ def _take_lines(
     """Take straight pieces of at least `min_length` radii off the members, best first."""
     if len(members) < MIN_ELLIPSES:
         return []
-    e = ellipses[members]
+    e = rows[members]
     width = float(np.median(e.width))
     free = np.ones(len(members), np.bool_)
     inliers = np.empty(len(members), np.bool_)
@@ -158,7 +183,7 @@ def _take_lines(
     return pieces
 
 
-def _taper(e: Ellipses, chosen: NDArray[np.intp], along: Array) -> tuple[float, float]:
+def _taper(e: _Rows, chosen: NDArray[np.intp], along: Array) -> tuple[float, float]:
     """Change of the radius along the axis, and its standard deviation."""
     weight = 1.0 / (e.radius_sd[chosen] ** 2 + 1e-8)
     s = along - (weight @ along) / weight.sum()
@@ -169,7 +194,7 @@ def _taper(e: Ellipses, chosen: NDArray[np.intp], along: Array) -> tuple[float, 
     return float(taper), float(scatter)
 
 
-def _fit_line(e: Ellipses, chosen: NDArray[np.intp], is_tapered: bool) -> tuple[LineSurface, Array]:
+def _fit_line(e: _Rows, chosen: NDArray[np.intp], is_tapered: bool) -> tuple[LineSurface, Array]:
     """Line through the chosen centres, weighted by their precision; chainages from its middle."""
     weight = 1.0 / (e.radius_sd[chosen] ** 2 + 1e-8)
     weight /= weight.sum()
@@ -200,9 +225,9 @@ def _longest_part(along: Array, max_gap: float) -> NDArray[np.intp]:
     return max(parts, key=len)
 
 
-def _take_arcs(ellipses: Ellipses, members: NDArray[np.intp]) -> list[Piece]:
+def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
     """Take bends off the members, best first."""
-    e = ellipses[members]
+    e = rows[members]
     free = np.ones(len(members), np.bool_)
     inliers = np.empty(len(members), np.bool_)
     arc = np.empty(8)
@@ -275,10 +300,13 @@ def find_spheres(ellipses: Ellipses) -> list[Piece]:
     free = np.isfinite(radii)
     tree = cKDTree(np.where(free[:, None], centres, 1e9))
     pieces: list[Piece] = []
-    for i in np.flatnonzero(free & (np.abs(offset) > 0.15)):
+    may_be = np.flatnonzero(free & (np.abs(offset) > 0.15))
+    # Most have hardly a neighbour: counting them all at once is quick.
+    n_near = tree.query_ball_point(centres[may_be], SAME_CENTRE * radii[may_be], return_length=True)
+    for i in may_be[n_near >= MIN_SPHERE]:
         if not free[i]:
             continue
-        near = np.sort(np.array(tree.query_ball_point(centres[i], 0.06 * radii[i]), np.intp))
+        near = np.sort(np.array(tree.query_ball_point(centres[i], SAME_CENTRE * radii[i]), np.intp))
         near = near[free[near] & (np.abs(radii[near] - radii[i]) < 0.05 * radii[i])]
         is_far = np.abs(offset[near]) > 0.1
         if is_far.sum() < MIN_SPHERE or np.ptp(offset[near]) < 0.4:

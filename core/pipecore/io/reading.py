@@ -1,7 +1,7 @@
 """From the chunks of one or several files to one cloud in one local frame."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,9 @@ ORIGIN_STEP = 100.0
 FLOAT32_REACH = 1024.0
 """Up to this far from the local zero a float32 is within 0.03 mm, metres."""
 
+LOOK_POINTS = 10_000
+"""About so many points of a chunk are shown before all are read."""
+
 FARTHEST = 1e9
 """Coordinates beyond this (metres) lie off any map; they count as invalid, like nan."""
 
@@ -33,6 +36,7 @@ def read(
     length_unit: LengthUnit = LengthUnit.METRE,
     folder: Path | None = None,
     progress: Progress | None = None,
+    look: Callable[[PointCloud], None] | None = None,
 ) -> PointCloud:
     """Read one point cloud from one or several files.
 
@@ -53,6 +57,9 @@ def read(
         then files in this folder, mapped into memory.
     progress : Progress, optional
         Told about the stage "reading"; may cancel.
+    look : callable, optional
+        Given a few points of every chunk as soon as it is read, evenly spread over it, as
+        a cloud with the origin of the whole: for showing what comes.
 
     Returns
     -------
@@ -79,7 +86,10 @@ def read(
             before = cloud.n_points
             cloud.begin_file(source, int(sizes[i]))
             for chunk in source.chunks:
+                start = cloud.n_points
                 cloud.add(chunk)
+                if look is not None and cloud.n_points > start:
+                    look(cloud.part(start, LOOK_POINTS))
                 done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
                 progress.update("reading", min(float(done), 1.0))
             if cloud.n_points == before:
@@ -198,6 +208,16 @@ class _GrowingCloud:
         if not self.has_wide_colours:
             return rgb.astype(np.uint8)
         return (rgb >> 8).astype(np.uint8)
+
+    def part(self, start: int, n_points: int) -> PointCloud:
+        """Return about so many of the points from `start` on, copied."""
+        assert self.origin is not None
+        rows = slice(start, self.n_points, max(1, (self.n_points - start) // n_points))
+        return PointCloud(
+            origin=self.origin,
+            xyz=self.xyz.array[rows].copy(),  # type: ignore[arg-type]
+            rgb=None if self.rgb is None else self.rgb.array[rows].copy(),  # type: ignore[arg-type]
+        )
 
     def finish(self, source: Path) -> PointCloud:
         """Return the cloud; nothing can be added after that."""

@@ -7,7 +7,10 @@ Importing this package imports neither the plot library nor the LAZ writer.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 from pipecore.io import write_directory, write_file, write_laz
 from pipecore.progress import NoProgress, Progress
@@ -19,13 +22,16 @@ from pipecore.report.tables import (
     write_elements_csv,
     write_profiles_csv,
 )
+from pipecore.report.world import FileCoordinates
 from pipecore.types import PointCloud, Result, Review
 
 __all__ = [
     "by_verdict",
     "result_to_dict",
     "summarise",
+    "write_deformation_mesh",
     "write_deformations_csv",
+    "write_element_mesh",
     "write_elements_csv",
     "write_html",
     "write_profiles_csv",
@@ -46,7 +52,8 @@ def write_report(
     """Write the whole report into a folder: all of it or nothing.
 
     It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``result.json``,
-    ``segments.laz``, ``report.html`` and ``settings.toml``.
+    ``segments.laz``, ``report.html`` and ``settings.toml``, and ``deformations.ply`` if the
+    settings ask for a mesh.
 
     Parameters
     ----------
@@ -80,6 +87,38 @@ def write_report(
         write_result_json(folder / "result.json", result, progress)
         write_html(folder / "report.html", cloud, result, progress)
         write_segments(folder / "segments.laz", cloud, result, progress)
+        if result.settings.deformation.mesh_exaggeration > 0:
+            write_deformation_mesh(folder / "deformations.ply", cloud, result)
+
+
+def write_deformation_mesh(
+    path: str | os.PathLike[str],
+    cloud: PointCloud,
+    result: Result,
+    deformation_ids: Sequence[int] | None = None,
+) -> None:
+    """Write the surfaces around deformations (all if None) as a mesh, .ply or .obj.
+
+    Deviations are exaggerated as the settings say. Errors as for `write_report`.
+    """
+    from pipecore.deformation import mesh_deformations  # noqa: PLC0415 - compiled kernels
+    from pipecore.report.meshes import write_meshes  # noqa: PLC0415
+
+    exaggeration = result.settings.deformation.mesh_exaggeration or 1.0
+    meshes = mesh_deformations(cloud, result, deformation_ids, exaggeration)
+    write_meshes(path, meshes, FileCoordinates.of(result))
+
+
+def write_element_mesh(
+    path: str | os.PathLike[str], cloud: PointCloud, result: Result, element_ids: Sequence[int]
+) -> None:
+    """Write the surfaces of whole elements as a mesh; see `write_deformation_mesh`."""
+    from pipecore.deformation import mesh_elements  # noqa: PLC0415
+    from pipecore.report.meshes import write_meshes  # noqa: PLC0415
+
+    exaggeration = result.settings.deformation.mesh_exaggeration or 1.0
+    meshes = mesh_elements(cloud, result, element_ids, exaggeration)
+    write_meshes(path, meshes, FileCoordinates.of(result))
 
 
 def write_html(
@@ -112,11 +151,16 @@ def write_segments(
         path,
         cloud,
         {
-            "segment_id": result.segment_id,
-            "element_id": result.element_id,
+            "segment_id": _narrowed(result.segment_id),
+            "element_id": _narrowed(result.element_id),
             "deviation_mm": result.deviation,
         },
         factors={"deviation_mm": 1000.0},
         length_unit=result.settings.input.length_unit,
         progress=progress,
     )
+
+
+def _narrowed(ids: NDArray[np.int32]) -> NDArray[np.unsignedinteger]:
+    """Ids in as few bytes as hold them: each byte of a point takes its time to compress."""
+    return ids.astype(np.min_scalar_type(int(ids.max(initial=0))))

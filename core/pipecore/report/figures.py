@@ -11,6 +11,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from pipecore.report.format import format_clock
 from pipecore.types import (
@@ -50,10 +51,19 @@ FINEST_CELLS_AROUND = 60
 POINTS_PER_CELL = 6
 SECTION_CELLS = 72
 
+Points = tuple[Array, Array, Array]
+"""Chainage, clock and deviation of an element's points."""
 
-def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result) -> str:
-    """Return the figure of one deformation as an ``<svg>`` element."""
+
+def draw_deformation(
+    deformation: Deformation, cloud: PointCloud, result: Result, rows: NDArray[np.intp]
+) -> str:
+    """Return the figure of one deformation as an ``<svg>`` element.
+
+    `rows` are those of the cloud's points that are the element's.
+    """
     element = result.element(deformation.element_id)
+    points = _points_of(element, cloud, result, rows)
     with mpl.rc_context(STYLE):
         # Places by hand: a layout engine takes as long as all the drawing.
         figure = Figure(figsize=(7.4, 2.3))
@@ -61,9 +71,9 @@ def draw_deformation(deformation: Deformation, cloud: PointCloud, result: Result
         left.patch.set_visible(False)
         _draw_radius(left, deformation, element, result)
         if deformation.kind in (DeformationKind.DENT, DeformationKind.BULGE):
-            _draw_map(right, deformation, element, cloud, result)
+            _draw_map(right, deformation, element, points)
         elif deformation.kind is DeformationKind.OVALITY:
-            _draw_section(right, deformation, element, cloud, result)
+            _draw_section(right, deformation, element, points)
         else:
             _draw_centres(right, deformation, element, result)
         text = io.StringIO()
@@ -118,17 +128,16 @@ def _drawn_depth(deformation: Deformation) -> float:
     return max(deformation.depth, 0.001) if np.isfinite(deformation.depth) else 0.01
 
 
-def _points_of(element: Element, cloud: PointCloud, result: Result) -> tuple[Array, Array, Array]:
+def _points_of(
+    element: Element, cloud: PointCloud, result: Result, rows: NDArray[np.intp]
+) -> Points:
     """Chainage, clock and deviation of an element's points."""
-    rows = np.flatnonzero(result.element_id == element.element_id)
     chainage, _, clock = element.axis.pipe_coordinates(np.asarray(cloud.xyz[rows], np.float64))
     return chainage, clock, np.asarray(result.deviation[rows], np.float64)
 
 
-def _draw_map(
-    axes: Axes, deformation: Deformation, element: Element, cloud: PointCloud, result: Result
-) -> None:
-    chainage, clock, deviation = _points_of(element, cloud, result)
+def _draw_map(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
+    chainage, clock, deviation = points
     reach = (deformation.chainage_end - deformation.chainage_start) / 2 + 2 * element.radius
     low = max(0.0, deformation.chainage - reach)
     high = min(element.axis.length, deformation.chainage + reach)
@@ -177,10 +186,8 @@ def _set_clock_ticks(axes: Axes, middle: float) -> None:
     axes.set_yticks(ticks, [format_clock(hour) for hour in hours])
 
 
-def _draw_section(
-    axes: Axes, deformation: Deformation, element: Element, cloud: PointCloud, result: Result
-) -> None:
-    chainage, clock, deviation = _points_of(element, cloud, result)
+def _draw_section(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
+    chainage, clock, deviation = points
     half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
     near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
     angle, mean = _means_around(clock[near], deviation[near])

@@ -8,11 +8,12 @@ from typing import Any
 import jinja2
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 import pipecore
+from pipecore._kernels.grouping import group_by_label
 from pipecore.geometry import ArcAxis
 from pipecore.progress import NoProgress, Progress
-from pipecore.report.figures import draw_deformation
 from pipecore.report.format import (
     NOT_MEASURABLE,
     format_clock,
@@ -234,8 +235,14 @@ def _bend(element: Element) -> str:
 def _figures(
     cloud: PointCloud, result: Result, place: FileCoordinates, progress: Progress
 ) -> list[dict[str, Any]]:
-    figures = []
     ordered = by_verdict(result)
+    if not ordered:
+        return []
+    # The plot library takes a while to import: only where something is drawn.
+    from pipecore.report.figures import draw_deformation  # noqa: PLC0415
+
+    figures = []
+    rows = _rows_of_elements(result, {d.element_id for d in ordered})
     for done, d in enumerate(ordered):
         progress.update("drawing figures", done / len(ordered))
         element = result.element(d.element_id)
@@ -244,11 +251,21 @@ def _figures(
                 "title": f"{d.kind.capitalize()} {d.deformation_id} on {element.label}",
                 "text": " · ".join(_where(d, place)),
                 "verdict": d.verdict,
-                "svg": Markup(draw_deformation(d, cloud, result)),
+                "svg": Markup(draw_deformation(d, cloud, result, rows[d.element_id])),
             }
         )
     progress.update("drawing figures", 1.0)
     return figures
+
+
+def _rows_of_elements(result: Result, element_ids: set[int]) -> dict[int, NDArray[np.intp]]:
+    """Rows of the points of some elements, found in one pass over the cloud."""
+    is_wanted = np.zeros(len(result.elements) + 1, np.bool_)
+    is_wanted[list(element_ids)] = True
+    rows = np.flatnonzero(is_wanted[result.element_id])
+    owner = result.element_id[rows]
+    members, starts = group_by_label(owner, len(is_wanted))
+    return {i: rows[members[starts[i] : starts[i + 1]]] for i in element_ids}
 
 
 def _where(d: Deformation, place: FileCoordinates) -> list[str]:

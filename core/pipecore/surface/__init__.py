@@ -91,7 +91,7 @@ def fit_planes(
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_planes(
-            xyz, *grid.lookup, radius, MIN_NEIGHBOURS, start, stop, grid.order,
+            xyz, *grid.rows, radius, MIN_NEIGHBOURS, start, stop, grid.order,
             normals, residuals, spacing,
         )  # fmt: skip
 

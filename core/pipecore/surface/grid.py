@@ -161,6 +161,11 @@ class CellGrid:
         return cls(edge, order, keys, starts, *table_of(keys), frame.n_y, frame.n_z)
 
     @property
+    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64], int, int]:
+        """What kernels need that go through all cells in their order."""
+        return self.cell_keys, self.cell_starts, self.n_y, self.n_z
+
+    @property
     def lookup(
         self,
     ) -> tuple[

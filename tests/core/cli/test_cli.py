@@ -42,7 +42,7 @@ def detections(monkeypatch) -> list[Settings]:
 
     monkeypatch.setattr("pipecore.cli.detect.detect", detect)
     # Figures take most of a report's time, and have their own tests.
-    monkeypatch.setattr("pipecore.report.html.draw_deformation", lambda *_: "<svg></svg>")
+    monkeypatch.setattr("pipecore.report.figures.draw_deformation", lambda *_: "<svg></svg>")
     return calls
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import CancelledError, ReadError
+from pipecore.io import las, reading
 from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
 
@@ -218,3 +219,31 @@ def test_that_importing_loads_no_library_of_any_format() -> None:
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split() == []
+
+
+def test_that_parts_are_shown_as_soon_as_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(las, "CHUNK_POINTS", 500)
+    monkeypatch.setattr(reading, "LOOK_POINTS", 50)
+    rng = np.random.default_rng(0)
+    world = np.array([432_100.0, 6_201_870.0, 110.0])
+    rgb = rng.integers(0, 255, (2000, 3), np.uint8)
+    made = PointCloud(world, rng.uniform(0, 5, (2000, 3)).astype(np.float32), rgb=rgb)
+    io.write_laz(tmp_path / "scan.laz", made)
+    parts: list[PointCloud] = []
+    done: list[int] = []
+
+    class Listening:
+        def update(self, stage: str, fraction: float) -> None:
+            done.append(len(parts))
+
+    cloud = io.read(tmp_path / "scan.laz", look=parts.append, progress=Listening())
+    assert [len(part) for part in parts] == [50] * 4
+    assert 1 in done  # the first came before the second was read
+    rows = np.concatenate([np.arange(start, start + 500, 10) for start in range(0, 2000, 500)])
+    assert all((part.origin == cloud.origin).all() for part in parts)
+    assert np.array_equal(np.concatenate([part.xyz for part in parts]), cloud.xyz[rows])
+    assert cloud.rgb is not None
+    shown = [part.rgb for part in parts if part.rgb is not None]
+    assert np.array_equal(np.concatenate(shown), cloud.rgb[rows])

@@ -118,7 +118,7 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
     normals, residuals, spacings = np.empty((n, 3)), np.empty(n), np.empty(n)
     for start, stop in ((0, 7), (7, len(grid.cell_keys))):
         neighbours.fit_planes(
-            sorted_xyz, *grid.lookup, radius, least_neighbours, start, stop, np.arange(n),
+            sorted_xyz, *grid.rows, radius, least_neighbours, start, stop, np.arange(n),
             normals, residuals, spacings,
         )  # fmt: skip
     reaches = []
