@@ -76,6 +76,7 @@ def apply_theme(app: QApplication) -> None:
     app.setStyle("Fusion")
     app.setPalette(_palette())
     style = resource("styles", "app.qss").read_text(encoding="utf-8")
+    style = style.replace("@here", resource("styles").as_posix())
     # Longest names first, so that @accent does not eat the start of @accent_soft.
     for role in sorted(_LIGHT, key=len, reverse=True):
         style = style.replace(f"@{role}", colour(role).name())

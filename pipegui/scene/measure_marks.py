@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
 from pipecore.report.format import MINUS
 from pipecore.types import PointCloud
 from pipegui.describe import axis_names, coordinate_lines
 from pipegui.document import Measurement
+from pipegui.scene.label_places import place_box
 from pipegui.scene.projection import Projection
 from pipegui.theme import SPACING
 
@@ -56,8 +57,12 @@ def draw_marks(
     projection: Projection,
     pens: Pens,
     taken: list[QRectF],
+    spots: list[QRectF],
 ) -> list[tuple[QRectF, int]]:
-    """Draw measurements; returns the places of their closing crosses with their numbers."""
+    """Draw measurements; returns the places of their closing crosses with their numbers.
+
+    What is written keeps off the boxes in `taken`, to which it is added, and off `spots`.
+    """
     crosses = []
     for mark in marks:
         ends = [e for e in (mark.measurement.start, mark.measurement.end) if e is not None]
@@ -73,20 +78,29 @@ def draw_marks(
             for end in at:
                 painter.drawLine(end - QPointF(END, 0), end + QPointF(END, 0))
                 painter.drawLine(end - QPointF(0, END), end + QPointF(0, END))
-        box = _write(painter, mark, (at[0] + at[-1]) / 2, pens)
+        box = _write(painter, mark, (at[0] + at[-1]) / 2, pens, [*taken, *spots])
         taken.append(box)
         if mark.number >= 0:
             crosses.append((_draw_cross(painter, box, pens), mark.number))
     return crosses
 
 
-def _write(painter: QPainter, mark: MeasureMark, middle: QPointF, pens: Pens) -> QRectF:
+def _write(
+    painter: QPainter, mark: MeasureMark, middle: QPointF, pens: Pens, taken: list[QRectF]
+) -> QRectF:
     metrics = painter.fontMetrics()
     line = metrics.height() + 1
     width = max(metrics.horizontalAdvance(text) for text in mark.lines) + 2 * SPACING
     width += CROSS + SPACING if mark.number >= 0 else 0
     height = line * len(mark.lines) + SPACING
-    box = QRectF(middle.x() + 1.5 * SPACING, middle.y() + 1.5 * SPACING, width, height)
+    size, leader = QSize(round(width), round(height)), 2.0 * SPACING
+    free = place_box(middle, size, painter.window(), taken, leader)
+    box = free or QRectF(middle.x() + 1.5 * SPACING, middle.y() + 1.5 * SPACING, width, height)
+    edge = QPointF(
+        min(max(middle.x(), box.left()), box.right()), min(max(middle.y(), box.top()), box.bottom())
+    )
+    painter.setPen(QPen(pens.line, 1.0))
+    painter.drawLine(middle, edge)
     painter.setPen(QPen(pens.line, 1.0))
     painter.setBrush(pens.paper)
     painter.drawRoundedRect(box, 4, 4)

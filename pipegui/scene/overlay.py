@@ -13,6 +13,7 @@ from pipecore.report.format import format_measure
 from pipecore.types import Deformation, DeformationKind
 from pipegui import theme
 from pipegui.colours import VERDICT
+from pipegui.scene.label_places import LEADER, place_box
 from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
@@ -20,7 +21,6 @@ from pipegui.scene.projection import Projection
 from pipegui.theme import SPACING
 
 ICON = 16
-LEADER = 36
 HANDLE = 5.0
 SCALE_BAR_PX = 140
 TRIAD_PX = 30
@@ -50,26 +50,6 @@ def round_length(metres: float) -> float:
 def length_text(metres: float) -> str:
     """Return a round length in the unit that reads best."""
     return f"{metres:g} m" if metres >= 1 else f"{1000 * metres:g} mm"
-
-
-def place_box(
-    anchor: QPointF, size: QSize, area: QRect, taken: list[QRectF], leader: float = LEADER
-) -> QRectF | None:
-    """Return where a label of `size` is free of others around its anchor, or None.
-
-    Tried are places up and to the sides first, near before far.
-    """
-    for reach in (leader, 2 * leader, 3.5 * leader):
-        for degrees in (60, 120, 25, 155, -25, 205, -60, 240):
-            angle = np.deg2rad(degrees)
-            x = anchor.x() + reach * np.cos(angle)
-            y = anchor.y() - reach * np.sin(angle)
-            left = x if np.cos(angle) > 0 else x - size.width()
-            box = QRectF(left, y - size.height() / 2, size.width(), size.height())
-            room = box.adjusted(-4, -4, 4, 4)
-            if QRectF(area).contains(room) and not any(room.intersects(t) for t in taken):
-                return box
-    return None
 
 
 def label_of(deformation: Deformation, *, is_selected: bool) -> Label:
@@ -144,7 +124,8 @@ class Overlay(QWidget):
             taken.append(self._draw_hint(painter, self.hint))
         accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
         pens = Pens(accent, text, paper)
-        self._crosses = draw_marks(painter, self.marks, self._projection, pens, taken)
+        spots = self._spots(self._projection)
+        self._crosses = draw_marks(painter, self.marks, self._projection, pens, taken, spots)
         self._draw_labels(painter, self._projection, taken)
         painter.end()
 
@@ -185,11 +166,7 @@ class Overlay(QWidget):
             return
         area, ground = self.rect(), tuple(taken)
         pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
-        # A label must not cover what another one points at.
-        spots = [
-            QRectF(x - 8, y - 8, 16, 16) if np.isfinite(x) and np.isfinite(y) else QRectF()
-            for x, y in pixels
-        ]
+        spots = self._spots(projection)
         order = sorted(range(len(self.labels)), key=lambda i: not self.labels[i].is_selected)
         marks = []
         for i in order:
@@ -215,6 +192,16 @@ class Overlay(QWidget):
         for anchor, box, label in reversed(marks):
             self._draw_label(painter, anchor, box, label)
         self._targets = [(box, self.labels[i].deformation_id) for box, i in self._targets]
+
+    def _spots(self, projection: Projection) -> list[QRectF]:
+        """Where the labels point at, which nothing written must cover."""
+        if not self.labels:
+            return []
+        pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))
+        return [
+            QRectF(x - 8, y - 8, 16, 16) if np.isfinite(x) and np.isfinite(y) else QRectF()
+            for x, y in pixels
+        ]
 
     def _draw_label(
         self, painter: QPainter, anchor: QPointF, box: QRectF | None, label: Label

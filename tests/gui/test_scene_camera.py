@@ -11,7 +11,8 @@ from pipegui.document import Document, ProfileKey, Scan, Selection
 from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.aiming import aim
-from pipegui.scene.overlay import length_text, place_box, round_length
+from pipegui.scene.label_places import place_box
+from pipegui.scene.overlay import length_text, round_length
 from pipegui.scene.picking import PICK_RADIUS_PX, _find_near, pick_point, points_near
 from pipegui.scene.point_layer import estimate_spacing
 from pipegui.scene.pose import VIEW_ANGLE, Pose
