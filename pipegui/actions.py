@@ -187,6 +187,9 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         ),
         *(_background(b) for b in Background),
         _SEPARATOR,
+        _A("next_panel", "Next panel", "Give the keyboard to the next panel", "", "F6"),
+        _A("previous_panel", "Previous panel", "Back to the panel before", "", "Shift+F6"),
+        _SEPARATOR,
     ),
     "Cloud": (
         _A("next_scan", "Next scan", "Look at the next open scan", "", "Ctrl+Tab", "scans"),

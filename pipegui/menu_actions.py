@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QDialog, QDialogButtonBox, QFormLayout, QLabel, QMenu, QMessageBox
+from PySide6.QtWidgets import QMenu, QMessageBox
 
 import pipecore
 from pipecore.errors import PipecoreError, WriteError
@@ -13,8 +13,8 @@ from pipecore.progress import Progress
 from pipecore.resources import resource
 from pipecore.settings import Settings
 from pipegui import commands, describe, files
-from pipegui.actions import SPECS
 from pipegui.command_search import CommandSearch
+from pipegui.shortcut_list import ShortcutList
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -178,22 +178,8 @@ class MenuActions:
         self._search.open()
 
     def show_shortcuts(self) -> None:
-        """List the keys of all actions."""
-        dialog = QDialog(self._window)
-        dialog.setObjectName("shortcuts")
-        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setWindowTitle("Keyboard shortcuts")
-        form = QFormLayout(dialog)
-        form.setHorizontalSpacing(32)
-        for spec in SPECS:
-            if spec.shortcut:
-                key = self._window.actions_[spec.name].shortcut().toString()
-                form.addRow(key, QLabel(spec.text.rstrip("…")))
-        form.addRow("← →", QLabel("Previous and next profile, in the section"))
-        buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        buttons.rejected.connect(dialog.close)
-        form.addRow(buttons)
-        dialog.show()
+        """List the keys of all actions and panels."""
+        ShortcutList(self._window).show()
 
     def show_about(self) -> None:
         """Say which version this is."""

@@ -9,6 +9,7 @@ from pipecore.types import ReviewState
 from pipegui import commands, cuts, describe, edit_commands, files, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
+from pipegui.panel_focus import go_to_next_panel
 from pipegui.presets import Presets
 
 if TYPE_CHECKING:
@@ -56,6 +57,8 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "hide": edits.hide,
         "zoom": scene.show_selection,
         "fit": scene.fit,
+        "next_panel": lambda: go_to_next_panel(window, 1),
+        "previous_panel": lambda: go_to_next_panel(window, -1),
         "next_scan": lambda: do(commands.step_scan),
         "detect": window.detect,
         "cancel": window.jobs.cancel,

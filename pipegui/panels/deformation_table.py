@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, Qt, Signal
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
+from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHBoxLayout,
@@ -72,7 +72,7 @@ class DeformationTable(QWidget):
         self.apply(self._state)
 
     def _make_view(self) -> QTableView:
-        view = QTableView()
+        view = _Table()
         view.setAccessibleName("Deformations")
         view.setModel(self.proxy)
         view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
@@ -343,6 +343,19 @@ class DeformationTable(QWidget):
             cells = [self.model.plain(row, INDEX[key]) for key in keys]
             lines.append("\t".join(" ".join(text.split()) for text in cells))
         QGuiApplication.clipboard().setText("\n".join(lines) + "\n")
+
+
+class _Table(QTableView):
+    """Keeps the key that edits a cell to itself where there is a cell to edit."""
+
+    def event(self, event: QEvent) -> bool:
+        """Take F2 before it becomes the window's shortcut."""
+        is_key = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
+        is_editable = bool(self.currentIndex().flags() & Qt.ItemFlag.ItemIsEditable)
+        if is_key and event.key() == Qt.Key.Key_F2 and is_editable:  # type: ignore[attr-defined]
+            event.accept()
+            return True
+        return super().event(event)
 
 
 class _ReviewChoice(QStyledItemDelegate):

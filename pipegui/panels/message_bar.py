@@ -42,6 +42,7 @@ class MessageBar(QFrame):
         self.details_button.clicked.connect(self._show_details)
         self.close_button = QToolButton()
         self.close_button.setAccessibleName("Close the message")
+        self.close_button.setToolTip("Close the message")
         self.close_button.clicked.connect(self.hide)
         self.answer_buttons: list[QToolButton] = []
         row = self._row = QHBoxLayout(self)

@@ -30,6 +30,7 @@ class ProfileBar(QWidget):
         row.addWidget(self.previous)
         self.slider = QSlider(Qt.Orientation.Horizontal)
         self.slider.setAccessibleName("Profile of the stack")
+        self.slider.setToolTip("Which profile of the stack is shown")
         self.slider.valueChanged.connect(self._tell)
         row.addWidget(self.slider, 1)
         self.next = self._button("›", "Next profile (.)", 1)

@@ -25,6 +25,7 @@ class StackEditor(QWidget):
         self.components = [self._component(name) for name in "XYZ"]
         self.width_mm = QuietSpinBox()
         self.width_mm.setAccessibleName("Profile width")
+        self.width_mm.setToolTip("Thickness of this stack's profiles; 0 takes that of the settings")
         self.width_mm.setRange(0, 1000)
         self.width_mm.setSuffix(" mm")
         self.width_mm.setSpecialValueText("as in the settings")
@@ -68,6 +69,7 @@ class StackEditor(QWidget):
     def _component(self, name: str) -> QuietSpinBox:
         field = QuietSpinBox()
         field.setAccessibleName(f"Direction {name}")
+        field.setToolTip(f"{name} of the direction along which profiles follow one another")
         field.setRange(-1, 1)
         field.setDecimals(3)
         field.setSingleStep(0.1)

@@ -1,7 +1,7 @@
 """Small widgets that several panels use."""
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QWheelEvent
+from PySide6.QtGui import QKeyEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QWidget
 
 from pipegui import theme
@@ -78,7 +78,9 @@ class QuietComboBox(QComboBox):
 
     def event(self, event: QEvent) -> bool:
         """Take letters for the choice, before they become the window's shortcuts."""
-        if event.type() == QEvent.Type.ShortcutOverride and event.text().isprintable():  # type: ignore[attr-defined]
+        is_key = isinstance(event, QKeyEvent) and event.type() == QEvent.Type.ShortcutOverride
+        # Function keys have no text, and "" counts as printable.
+        if is_key and event.text() and event.text().isprintable():  # type: ignore[attr-defined]
             event.accept()
             return True
         return super().event(event)

@@ -1,0 +1,169 @@
+"""Every input can be named, explained and reached without a mouse."""
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractItemView,
+    QAbstractSlider,
+    QAbstractSpinBox,
+    QComboBox,
+    QHeaderView,
+    QLabel,
+    QLineEdit,
+    QMenu,
+    QScrollBar,
+    QTabBar,
+    QWidget,
+)
+
+from pipegui import commands, view_commands
+from pipegui.document import Scan
+from pipegui.panels.deformation_columns import INDEX
+from tests.factories import make_scan
+
+CLOUD, RESULT = make_scan()
+INPUTS = (QAbstractSpinBox, QAbstractSlider, QComboBox, QLineEdit, QAbstractItemView)
+
+
+def is_inside_another(widget):
+    """Parts that Qt makes of its own: a spin box's line, a combo's list, scroll bars."""
+    parent = widget.parentWidget()
+    own = (QScrollBar, QMenu, QHeaderView)
+    makers = (QAbstractSpinBox, QComboBox, QLineEdit, QTabBar)
+    while parent is not None:
+        if isinstance(parent, makers):
+            return True
+        parent = parent.parentWidget()
+    return isinstance(widget, own) or widget.objectName().startswith("qt_")
+
+
+def inputs(window):
+    return [w for w in window.findChildren(QWidget) if isinstance(w, INPUTS)]
+
+
+def has_label(widget):
+    window = widget.window()
+    return any(label.buddy() is widget for label in window.findChildren(QLabel))
+
+
+def named(widget):
+    return f"{type(widget).__name__} {widget.objectName()} in {type(widget.parent()).__name__}"
+
+
+@pytest.fixture
+def whole(make_window, qtbot):
+    """A window with the real plots beside a fake 3D view."""
+    from pipegui.plots.deviation_map import DeviationMap
+    from pipegui.plots.preview_view import PreviewView
+    from pipegui.plots.radius_plot import RadiusPlot
+    from pipegui.plots.section_view import SectionView
+    from tests.gui.fakes import make_fake_parts
+
+    parts = make_fake_parts()
+    parts.radius_plot, parts.section = RadiusPlot(), SectionView()
+    parts.map, parts.preview = DeviationMap(), PreviewView()
+    window = make_window(parts=parts)
+    window.do(commands.open_scan, Scan("plant.laz", CLOUD))
+    window.take_result(CLOUD, RESULT)
+    window.do(view_commands.clip_to_scan)
+    return window
+
+
+def test_that_every_input_has_a_name(whole):
+    nameless = [
+        named(widget)
+        for widget in inputs(whole)
+        if not is_inside_another(widget) and not widget.accessibleName() and not has_label(widget)
+    ]
+    assert not nameless, "\n".join(nameless)
+
+
+def test_that_every_button_without_words_has_a_name_and_a_tip(whole):
+    silent = [
+        named(button)
+        for button in whole.findChildren(QAbstractButton)
+        if not is_inside_another(button)
+        and not button.text()
+        and not (button.accessibleName() and button.toolTip())
+        and type(button).__name__ != "QTableCornerButton"
+        and button.parent().metaObject().className() != "QDockWidget"
+    ]
+    assert not silent, "\n".join(silent)
+
+
+def test_that_every_choice_and_number_explains_itself(whole):
+    silent = [
+        named(widget)
+        for widget in inputs(whole)
+        if isinstance(widget, QComboBox | QAbstractSpinBox | QAbstractSlider)
+        and not is_inside_another(widget)
+        and not widget.toolTip()
+    ]
+    assert not silent, "\n".join(silent)
+
+
+def test_that_tab_goes_down_the_settings(whole, qtbot):
+    form = whole.panels.settings
+    whole.panels.docks["Settings"].raise_()
+    form.presets.choice.setFocus()
+    places = []
+    for _ in range(40):
+        qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_Tab)
+        focused = whole.focusWidget()
+        if not form.isAncestorOf(focused) or focused in (form.reset, form.advanced.button):
+            break
+        places.append(focused.mapTo(form.widget(), focused.rect().topLeft()).y())
+    assert len(places) > 10
+    assert places == sorted(places)
+
+
+def test_that_f6_goes_from_panel_to_panel_and_back(whole, qtbot):
+    docks = whole.panels.docks
+
+    def panel_of(widget):
+        return next((t for t, dock in docks.items() if dock.isAncestorOf(widget)), "centre")
+
+    visited = []
+    for _ in range(6):
+        qtbot.keyClick(whole.focusWidget() or whole, Qt.Key.Key_F6)
+        visited.append(panel_of(whole.focusWidget()))
+    assert len(set(visited)) >= 4
+    qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
+    assert panel_of(whole.focusWidget()) == visited[-2]
+
+
+def test_that_the_list_of_keys_names_all_of_them(whole, qtbot):
+    from PySide6.QtWidgets import QDialog, QDialogButtonBox
+
+    from pipegui.actions import SPECS
+
+    qtbot.keyClick(whole, Qt.Key.Key_F1)
+    dialog = whole.findChild(QDialog, "shortcuts")
+    text = " ".join(label.text() for label in dialog.findChildren(QLabel))
+    for spec in SPECS:
+        if spec.shortcut:
+            key = whole.actions_[spec.name].shortcut()
+            assert key.toString(key.SequenceFormat.NativeText) in text
+    for words in ("Ctrl+C", "Page Up", "F2"):
+        assert words in text
+    assert dialog.height() <= 768
+    close = dialog.findChild(QDialogButtonBox).buttons()[0]
+    qtbot.keyClick(close, Qt.Key.Key_Space)
+    qtbot.waitUntil(lambda: whole.findChild(QDialog, "shortcuts") is None)
+
+
+def test_that_f2_in_the_table_writes_a_comment_and_renames_nothing(whole, qtbot):
+    table = whole.panels.table
+    table.view.setFocus()
+    table.view.setCurrentIndex(table.proxy.index(0, INDEX["comment"]))
+    qtbot.keyClick(table.view, Qt.Key.Key_F2)
+    editor = table.view.findChild(QLineEdit)
+    assert editor is not None
+    qtbot.keyClicks(editor, "f is no shortcut here")
+    with qtbot.waitSignal(table.commented):
+        qtbot.keyClick(editor, Qt.Key.Key_Return)
+    chosen = whole.document.selection.deformation_id
+    assert whole.document.scan.review(chosen).comment == "f is no shortcut here"
+    whole.actions_["undo"].trigger()
+    assert whole.document.scan.review(chosen).comment == ""
