@@ -220,7 +220,7 @@ class Edits:
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
             progress.expect(STAGES)
             index = editing.points_around(cloud, result, ids)
-            return editing.detect_again(cloud, result, index, settings, progress)
+            return editing.detect_again(cloud, result, index, settings, progress, ids)
 
         self._reshape("Detecting again", f"Detect again around {names}", change, expected=False)
 

@@ -1,5 +1,6 @@
 """Detecting again in a part of the cloud, with settings that suit it."""
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -38,11 +39,13 @@ def detect_again(
     index: Indices,
     settings: Settings,
     progress: Progress = NoProgress(),
+    replaced: Collection[int] | None = None,
 ) -> Result:
     """Detect in a part of the cloud and put what is found in the place of what was there.
 
-    Elements that lie in the part are replaced; one that only reaches into it stays, and is
-    not found a second time. What is found again keeps its id, run and name.
+    Elements that lie in the part are replaced, or those that are named; one that only
+    reaches into the part stays, and is not found a second time. What is found again keeps
+    its id, run and name.
 
     Parameters
     ----------
@@ -52,6 +55,8 @@ def detect_again(
         The points of the part; see `points_around` and `points_in_box`.
     settings : Settings
     progress : Progress
+    replaced : collection of int, optional
+        Ids of the elements to be replaced, where others in the part are to stay.
 
     Raises
     ------
@@ -70,8 +75,9 @@ def detect_again(
     gone = {
         e.element_id
         for e in result.elements
-        if n_within[e.element_id] >= WITHIN * n_all[e.element_id]
+        if replaced is None and n_within[e.element_id] >= WITHIN * n_all[e.element_id]
     }
+    gone |= {find(result, i).element_id for i in replaced or ()}
     rest = without(result, gone)
     is_kept = rest.element_id[index] != NO_ID
     n_found = np.bincount(found.element_id, minlength=len(found.elements) + 1)

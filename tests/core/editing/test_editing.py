@@ -229,9 +229,11 @@ def test_that_a_name_is_shown_until_it_is_taken_back(result, dented):
 def test_that_detecting_again_around_a_pipe_finds_it_again_under_its_id(simulated, result, dented):
     cloud = simulated.cloud
     index = editing.points_around(cloud, result, [dented])
-    again = editing.detect_again(cloud, result, index, Settings())
+    again = editing.detect_again(cloud, result, index, Settings(), replaced=[dented])
     assert_sound(again)
     assert again.element(dented).radius == pytest.approx(RADIUS, abs=0.0005)
+    others = [e for e in result.elements if e.element_id != dented]
+    assert [e for e in again.elements if e.element_id != dented] == others
     outside = np.setdiff1d(np.arange(len(cloud)), index)
     assert_array_equal(
         again.element_id[outside][result.element_id[outside] != dented],
