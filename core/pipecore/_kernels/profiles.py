@@ -214,3 +214,21 @@ def join_neighbours(
                 j += 1
     for i in range(start, stop):
         parents[i] = find_root(parents, i)
+
+
+@njit(cache=True, nogil=True)
+def gather(points, uv, normals_uvd, profile, members, starts):
+    """Points, positions and normals of the members, and the profile of each group."""
+    n = members.shape[0]
+    of = np.empty(n, np.int32)
+    places, vectors = np.empty((n, 2)), np.empty((n, 3))
+    for row in range(n):
+        i = members[row]
+        of[row] = points[i]
+        places[row, 0], places[row, 1] = uv[i, 0], uv[i, 1]
+        for k in range(3):
+            vectors[row, k] = normals_uvd[i, k]
+    index = np.empty(starts.shape[0] - 1, np.int32)
+    for g in range(index.shape[0]):
+        index[g] = profile[members[starts[g]]]
+    return of, places, vectors, index

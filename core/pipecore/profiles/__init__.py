@@ -219,15 +219,8 @@ class _Cutter:
     ) -> Curves:
         """Group points by label; labels lie within profiles. Small groups are dropped."""
         members, starts = group_large(label, n_labels, MIN_CURVE)
-        return Curves(
-            self._stack,
-            self.frame,
-            points[members],
-            uv[members],
-            normals[members],
-            starts,
-            profile[members[starts[:-1]]],
-        )
+        own, places, vectors, index = kernels.gather(points, uv, normals, profile, members, starts)
+        return Curves(self._stack, self.frame, own, places, vectors, starts, index)
 
 
 def _concatenated(
