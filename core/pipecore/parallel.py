@@ -20,6 +20,8 @@ def set_threads(n_threads: int) -> None:
     """Set how many threads kernels may use."""
     global _n_threads  # noqa: PLW0603 - one setting of the process, like numba's own
     _n_threads = max(1, n_threads)
+    # Heard by the compressor of LAZ if it has not begun yet.
+    os.environ["RAYON_NUM_THREADS"] = str(_n_threads)
 
 
 def threads() -> int:

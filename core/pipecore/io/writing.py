@@ -15,6 +15,8 @@ from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
 
+POINTS_AT_A_TIME = 600_000
+"""A dozen of LAZ's own chunks of 50,000, so that threads that compress them end together."""
 FINEST = 1e-4
 """Step of the coordinates written, metres; half of it is lost at most."""
 
@@ -79,7 +81,9 @@ def write_laz(
         temporary.open("wb") as file,
         laspy.LasWriter(file, header, do_compress=True, closefd=False) as writer,
     ):
-        for start, stop in in_chunks(len(cloud), CHUNK_POINTS, "writing", progress or NoProgress()):
+        for start, stop in in_chunks(
+            len(cloud), POINTS_AT_A_TIME, "writing", progress or NoProgress()
+        ):
             rows = slice(start, stop)
             points = laspy.ScaleAwarePointRecord.zeros(stop - start, header=header)
             world = cloud.world(cloud.xyz[rows].astype(np.float64)) / length_unit.metres
