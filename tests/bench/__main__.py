@@ -8,6 +8,7 @@ which does not tell what memory a process that has ended had needed.
 import argparse
 import json
 import os
+import pickle
 import shutil
 import sys
 from collections.abc import Sequence
@@ -23,6 +24,9 @@ from tests.bench.watching import Cost, run
 ROOT = Path(__file__).parents[2]
 OUT = ROOT / "out" / "bench"
 DEMO = ROOT / "resources" / "demo" / "demo.laz"
+
+KEPT = OUT / "lines.pickle"
+"""What has been measured; read again by `--add`."""
 
 READ_WITH_LASPY = "import sys, laspy; laspy.read(sys.argv[1]).xyz"
 
@@ -59,9 +63,10 @@ def cloud_of(million: float) -> Path:
     return cloud
 
 
-def measure(points: Sequence[float], threads: Sequence[int]) -> list[Line]:
+def measure(
+    points: Sequence[float], threads: Sequence[int], lines: dict[tuple[int, int], Line]
+) -> None:
     """Measure detections of all sizes and numbers of threads, with laspy beside each."""
-    lines = []
     for million in points:
         cloud = cloud_of(million)
         for n_threads in threads:
@@ -71,9 +76,10 @@ def measure(points: Sequence[float], threads: Sequence[int]) -> list[Line]:
             second = run([sys.executable, "-c", READ_WITH_LASPY, str(cloud)])
             reading = min(first, second, key=lambda c: c.wall)
             n_elements = len(result["elements"])
-            lines.append(Line(result["n_cloud_points"], n_threads, n_elements, cost, reading))
-            print(page.row_of(lines[-1]), flush=True)
-    return lines
+            line = Line(result["n_cloud_points"], n_threads, n_elements, cost, reading)
+            lines[line.n_points, n_threads] = line
+            KEPT.write_bytes(pickle.dumps(lines))
+            print(page.row_of(line), flush=True)
 
 
 def measure_peers(million: float) -> list[PeerLine]:
@@ -100,12 +106,18 @@ def main() -> None:
         "--peers", type=float, default=4.0, metavar="MILLION",
         help="points of the cloud given to other programs, 0 for none; default 4",
     )  # fmt: skip
+    parser.add_argument(
+        "--add", action="store_true",
+        help="keep what former runs have measured of other sizes: large ones take their time",
+    )  # fmt: skip
     args = parser.parse_args()
     OUT.mkdir(parents=True, exist_ok=True)
     compiling = compiling_seconds(max(args.threads))
-    lines = measure(args.points, sorted(set(args.threads)))
+    # Our own file.
+    lines = pickle.loads(KEPT.read_bytes()) if args.add and KEPT.exists() else {}
+    measure(args.points, sorted(set(args.threads)), lines)
     peers = measure_peers(args.peers) if args.peers else []
-    page.write(lines, peers, args.peers, compiling, sys.argv[1:])
+    page.write([lines[key] for key in sorted(lines)], peers, args.peers, compiling, sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Other programs on the same cloud, where they are installed.
 
-None of them measures deformations, and only CGAL looks for pipes: what each does is told
+None of them measures deformations; CGAL and CloudCompare look for cylinders: what each does is told
 beside its time. Their files are made before and not counted.
 """
 
@@ -29,6 +29,16 @@ with open(sys.argv[2], "wb") as f:
     f.write(
         f"VERSION .7\\nFIELDS x y z\\nSIZE 4 4 4\\nTYPE F F F\\nCOUNT 1 1 1\\nWIDTH {len(xyz)}\\n"
         f"HEIGHT 1\\nVIEWPOINT 0 0 0 1 0 0 0\\nPOINTS {len(xyz)}\\nDATA binary\\n".encode()
+    )
+    xyz.tofile(f)
+"""
+TO_PLY = """
+import sys, numpy as np
+xyz = np.fromfile(sys.argv[1], np.float32).reshape(-1, 3)
+with open(sys.argv[2], "wb") as f:
+    f.write(
+        f"ply\\nformat binary_little_endian 1.0\\nelement vertex {len(xyz)}\\n"
+        "property float x\\nproperty float y\\nproperty float z\\nend_header\\n".encode()
     )
     xyz.tofile(f)
 """
@@ -79,10 +89,28 @@ def pcl(cloud: Path, folder: Path) -> Cost:
     return Cost(first.wall + second.wall, first.cpu + second.cpu, max(first.memory, second.memory))
 
 
+def cloudcompare(cloud: Path, folder: Path) -> Cost:
+    """Find planes, cylinders, tori and spheres by its RANSAC (Schnabel's)."""
+    program = shutil.which("CloudCompare")
+    if program is None:
+        raise NotThereError("cloudcompare")
+    ply = folder / f"{cloud.stem}.ply"
+    if not ply.exists():
+        subprocess.run(
+            [sys.executable, "-c", TO_PLY, str(_raw(cloud, folder)), str(ply)], check=True
+        )
+    primitives = ["PLANE", "CYLINDER", "TORUS", "SPHERE"]
+    ransac = ["-RANSAC", "EPSILON_ABSOLUTE", "0.005", "BITMAP_EPSILON_ABSOLUTE", "0.02"]
+    ransac += ["SUPPORT_POINTS", "500", "ENABLE_PRIMITIVE", *primitives]
+    command = [program, "-SILENT", "-AUTO_SAVE", "OFF", "-NO_TIMESTAMP", "-O", str(ply), *ransac]
+    return run(command, QT_QPA_PLATFORM="offscreen")
+
+
 PEERS: dict[str, Callable[[Path, Path], Cost]] = {
     "open3d: read, thin, normals": open3d,
     "PCL’s tools: thin, normals": pcl,
     "CGAL: normals, Efficient RANSAC": cgal,
+    "CloudCompare: normals, RANSAC": cloudcompare,
 }
 
 
