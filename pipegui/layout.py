@@ -105,6 +105,9 @@ def arrange(window: "MainWindow") -> None:
         ("Preview", parts.preview),
     ):
         plots.addTab(widget, title)
+    # A click on a tab means the plot: the arrow keys are then its own, not the tabs'.
+    plots.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    plots.tabBarClicked.connect(lambda i: plots.widget(i).setFocus() if i >= 0 else None)
 
     _dock(window, "Project", panels.tree, LEFT)
     _dock(window, "Stacks", panels.stacks, LEFT)

@@ -167,3 +167,15 @@ def test_that_f2_in_the_table_writes_a_comment_and_renames_nothing(whole, qtbot)
     assert whole.document.scan.review(chosen).comment == "f is no shortcut here"
     whole.actions_["undo"].trigger()
     assert whole.document.scan.review(chosen).comment == ""
+
+
+def test_that_after_a_click_on_its_tab_the_arrows_step_through_the_sections(whole, qtbot):
+    tabs, section = whole.panels.plots, whole.parts.section
+    place = tabs.tabBar().tabRect(tabs.indexOf(section)).center()
+    qtbot.mouseClick(tabs.tabBar(), Qt.MouseButton.LeftButton, pos=place)
+    qtbot.waitUntil(section.isVisible)
+    shown = section.title.text()
+    qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_Right)
+    assert tabs.currentWidget() is section
+    assert section.title.text() != shown
+    assert whole.document.selection.profile is not None
