@@ -148,22 +148,26 @@ def _stages(lines: Sequence[Line]) -> str:
     columns = ["start", "reading", "thinning", "normals", "directions", "profiles", "elements"]
     columns += ["deformations", "report"]
     rows = []
+    columns += sorted({s for line in lines for s in line.cost.stages if _column(s) not in columns})
     for line in lines:
         merged: dict[str, Stage] = {}
         for name, stage in line.cost.stages.items():
-            key = "report" if name in REPORT else "profiles" if name in WITH_PROFILES else name
+            key = _column(name)
             old = merged.get(key, Stage(0.0, 0.0, 0))
             merged[key] = Stage(
                 old.wall + stage.wall, old.cpu + stage.cpu, max(old.memory, stage.memory)
             )
-        if unknown := set(merged) - set(columns):
-            raise ValueError(f"These stages have no column: {unknown}")
         cells = [
             f"{merged[c].cpu:.1f}, {merged[c].memory / 1e9:.1f}" if c in merged else ""
             for c in columns
         ]
         rows.append(f"| {line.n_points / 1e6:.2f} | {line.threads} | {' | '.join(cells)} |")
     return _table(("million points", "threads", *columns), rows)
+
+
+def _column(stage: str) -> str:
+    """Return the column of a stage."""
+    return "report" if stage in REPORT else "profiles" if stage in WITH_PROFILES else stage
 
 
 def _table(columns: Sequence[str], rows: Sequence[str], left: int = 0) -> str:
