@@ -11,6 +11,7 @@ from pipecore.geometry import LineAxis
 from pipecore.progress import NoProgress
 from pipecore.settings import ThinningSettings
 from pipecore.surface import median_spacing, thin
+from pipecore.surface.spacing import sample_by_place
 from pipecore.types import PointCloud
 from tests.core.shapes import cloud_of, plane, random_direction, tube
 
@@ -74,3 +75,31 @@ def test_that_the_automatic_voxel_is_the_spacing_of_the_scan(rng):
 def test_that_scans_are_not_thinned_below_their_noise(rng):
     sheet = plane(rng, np.zeros(3), [0.1, 0, 0], [0, 0.1, 0], 0.001)
     assert thin(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == 0.003
+
+
+@pytest.mark.parametrize("case", ["pipe", "far outlier", "doubled", "few", "thick"])
+def test_that_the_spacing_is_that_of_a_tree_of_all_points(rng, case):
+    xyz = pipe(rng)[0]
+    match case:
+        case "far outlier":
+            xyz = np.concatenate([xyz, [[4e5, -3e5, 10.0]]])
+        case "doubled":
+            xyz = np.repeat(xyz, 10, axis=0)
+        case "few":
+            xyz = xyz[:6]
+        case "thick":
+            xyz = rng.normal(size=(20_000, 3))
+    n_sample, k = 500, min(8, len(xyz) - 1)
+    rows = sample_by_place(xyz, min(n_sample, len(xyz)))
+    reach = cKDTree(xyz).query(xyz[rows], k + 1)[0][:, -1]
+    expected = np.median(reach) * np.sqrt(np.pi / (k + 1))
+    assert median_spacing(xyz, n_sample) == pytest.approx(expected, rel=1e-12)
+
+
+def test_that_the_sample_is_the_same_in_any_order_and_has_its_size(rng):
+    xyz = np.repeat(pipe(rng)[0], 3, axis=0)
+    once = xyz[sample_by_place(xyz, 700)]
+    shuffled = xyz[rng.permutation(len(xyz))]
+    again = shuffled[sample_by_place(shuffled, 700)]
+    assert_array_equal(np.unique(again, axis=0), np.unique(once, axis=0))
+    assert len(once) == len(again) == 700
