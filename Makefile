@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui study bench format lock venv system-packages clean
+.PHONY: help demo test lint test-core test-kernels test-gui study bench pictures format lock venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -47,6 +47,9 @@ study: venv ## Measure the accuracy on simulated scans (half an hour; writes doc
 
 bench: venv ## Measure time and memory (writes docs/performance.md)
 	$(PYTHON) -m tests.bench
+
+pictures: venv ## Take the pictures of README and guide anew
+	$(WINDOWED) $(PYTHON) -m tests.pictures
 
 format: venv ## Lay out the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix

@@ -44,6 +44,12 @@ def _background(background: Background) -> ActionSpec:
     return ActionSpec(name, str(background), tip, is_checkable=True, submenu="Background")
 
 
+def _appearance(appearance: theme.Appearance) -> ActionSpec:
+    name = f"appearance_{appearance.name.lower()}"
+    tip = "Colours of the window"
+    return ActionSpec(name, str(appearance), tip, is_checkable=True, submenu="Appearance")
+
+
 MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     "File": (
         _A("open", "Open…", "Open laser scans", "folder-open-outline", "Ctrl+O"),
@@ -186,6 +192,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "result",
         ),
         *(_background(b) for b in Background),
+        *(_appearance(a) for a in theme.Appearance),
         _SEPARATOR,
         _A("next_panel", "Next panel", "Give the keyboard to the next panel", "", "F6"),
         _A("previous_panel", "Previous panel", "Back to the panel before", "", "Shift+F6"),

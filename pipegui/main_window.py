@@ -75,8 +75,9 @@ class MainWindow(QMainWindow):
         wiring.connect_views(self)
         wiring.connect_previews(self)
         wiring.connect_jobs(self)
-        QApplication.styleHints().colorSchemeChanged.connect(self._change_scheme)
+        QApplication.styleHints().colorSchemeChanged.connect(self.refresh_colours)
         self._apply(resolve(self.history.document), everything=True)
+        self.menu_actions.restore_appearance()
 
     @property
     def document(self) -> Document:
@@ -252,7 +253,8 @@ class MainWindow(QMainWindow):
 
     # Qt
 
-    def _change_scheme(self) -> None:
+    def refresh_colours(self) -> None:
+        """Draw all in the colours that the theme has now."""
         app = QApplication.instance()
         if isinstance(app, QApplication):
             theme.apply_theme(app)
@@ -283,7 +285,7 @@ class MainWindow(QMainWindow):
             return
         self.stored.setValue("window/geometry", self.saveGeometry())
         self.stored.setValue("window/state", self.saveState(LAYOUT_VERSION))
-        QApplication.styleHints().colorSchemeChanged.disconnect(self._change_scheme)
+        QApplication.styleHints().colorSchemeChanged.disconnect(self.refresh_colours)
         self.jobs.close()
         self.projects.close()
         self.parts.scene.close()

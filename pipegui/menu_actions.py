@@ -12,7 +12,7 @@ from pipecore.errors import PipecoreError, WriteError
 from pipecore.progress import Progress
 from pipecore.resources import resource
 from pipecore.settings import Settings
-from pipegui import commands, describe, files
+from pipegui import commands, describe, files, theme
 from pipegui.command_search import CommandSearch
 from pipegui.shortcut_list import ShortcutList
 
@@ -77,6 +77,25 @@ class MenuActions:
             action.setCheckable(True)
             action.setChecked(n_done == history.n_done)
             action.triggered.connect(lambda _=False, n=n_done: history.go_to(n))
+
+    # Colours
+
+    def choose_appearance(self, appearance: theme.Appearance) -> None:
+        """Take other colours, now and when the window is next opened."""
+        self._window.stored.setValue("appearance", appearance.name)
+        self.restore_appearance()
+
+    def restore_appearance(self) -> None:
+        """Take the colours that were chosen last."""
+        name = str(self._window.stored.value("appearance", ""))
+        chosen = theme.Appearance.__members__.get(name, theme.Appearance.SYSTEM)
+        was_dark = theme.is_dark()
+        theme.choose(chosen)
+        if theme.is_dark() != was_dark:
+            self._window.refresh_colours()
+        for appearance in theme.Appearance:
+            key = f"appearance_{appearance.name.lower()}"
+            self._window.actions_.set_checked(key, appearance is chosen)
 
     # Settings
 

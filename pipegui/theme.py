@@ -1,5 +1,6 @@
 """How the window looks: palette and style for light and dark, icons of one family."""
 
+from enum import StrEnum
 from functools import cache
 
 import qtawesome
@@ -20,7 +21,7 @@ _LIGHT = {
     "alternate": "#f8f9fb",
     "button": "#ffffff",
     "text": "#22262b",
-    "muted": "#6f7782",
+    "muted": "#676f7a",
     "border": "#d9dce1",
     "hover": "#e9ebf0",
     "accent": ACCENT,
@@ -60,9 +61,30 @@ VERDICT_ICON = {
 }
 
 
+class Appearance(StrEnum):
+    """Which colours the window has."""
+
+    SYSTEM = "As the system"
+    LIGHT = "Light"
+    DARK = "Dark"
+
+
+class _Chosen:
+    """What the user chose last; the same for all windows."""
+
+    appearance = Appearance.SYSTEM
+
+
+def choose(appearance: Appearance) -> None:
+    """Have dark or light colours whatever the system asks for, from the next drawing on."""
+    _Chosen.appearance = appearance
+
+
 def is_dark() -> bool:
-    """Whether the system asks for dark colours."""
-    return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
+    """Whether the user, or else the system, asks for dark colours."""
+    if _Chosen.appearance is Appearance.SYSTEM:
+        return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
+    return _Chosen.appearance is Appearance.DARK
 
 
 def colour(role: str, *, dark: bool | None = None) -> QColor:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
-from pipegui import commands, cuts, describe, edit_commands, files, view_commands
+from pipegui import commands, cuts, describe, edit_commands, files, theme, view_commands
 from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
 from pipegui.panel_focus import go_to_next_panel
@@ -86,6 +86,9 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         name = f"background_{background.name.lower()}"
         # A click on the one that is chosen chooses it again.
         found[name] = lambda _, b=background: do(commands.set_view, background=b)
+    for appearance in theme.Appearance:
+        name = f"appearance_{appearance.name.lower()}"
+        found[name] = lambda _, a=appearance: menu.choose_appearance(a)
     for name in VIEW_OPTIONS:
         found[name] = lambda on, name=name: do(commands.set_view, **{name: on})
     return found

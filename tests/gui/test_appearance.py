@@ -1,0 +1,47 @@
+"""Dark and light: chosen, kept, and as legible as each other."""
+
+import pytest
+from PySide6.QtGui import QPalette
+from PySide6.QtWidgets import QApplication
+
+from pipegui import theme
+
+
+@pytest.fixture(autouse=True)
+def colours_of_the_system(qapp):
+    yield
+    theme.choose(theme.Appearance.SYSTEM)
+    theme.apply_theme(qapp)
+
+
+def luminance(colour):
+    """Relative luminance as WCAG 2 defines it."""
+    parts = [colour.redF(), colour.greenF(), colour.blueF()]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+def test_that_the_chosen_appearance_is_shown_and_kept(make_window):
+    window = make_window()
+    window.actions_["appearance_dark"].trigger()
+    assert luminance(QApplication.palette().color(QPalette.ColorRole.Window)) < 0.1
+    assert window.actions_["appearance_dark"].isChecked()
+    assert not window.actions_["appearance_system"].isChecked()
+    other = make_window()
+    assert other.actions_["appearance_dark"].isChecked()
+    assert theme.is_dark()
+    other.actions_["appearance_light"].trigger()
+    assert luminance(QApplication.palette().color(QPalette.ColorRole.Window)) > 0.8
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_that_text_stands_out_from_what_it_stands_on(dark):
+    for text in ("text", "muted"):
+        for ground in ("window", "base", "alternate"):
+            ratio = contrast(theme.colour(text, dark=dark), theme.colour(ground, dark=dark))
+            assert ratio > 4.5, (text, ground)
