@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipecore import io, parallel
+from pipecore._kernels.neighbours import fit_planes
 from pipecore.cli.console import Console
 from pipecore.cli.parser import given_settings
 from pipecore.errors import WriteError
@@ -29,6 +30,11 @@ def run(args: argparse.Namespace, console: Console) -> None:
     _check_output(args.output, args.overwrite)
     if args.threads:
         parallel.set_threads(args.threads)
+    if not is_compiled():
+        console.note(
+            "The first detection on a machine compiles its kernels, which takes half a minute or "
+            "more; later ones do without."
+        )
 
     with _detected(args, settings, console) as (cloud, result):
         write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
@@ -37,6 +43,12 @@ def run(args: argparse.Namespace, console: Console) -> None:
     for line in deformation_lines(result):
         console.say(line)
     console.say(f"Report: {args.output / 'report.html'}")
+
+
+def is_compiled() -> bool:
+    """Whether the kernels were compiled before; their store tells."""
+    stats = getattr(fit_planes, "stats", None)  # none where compiling is switched off
+    return stats is None or any(Path(stats.cache_path).glob("neighbours.fit_planes-*.nbi"))
 
 
 @contextmanager

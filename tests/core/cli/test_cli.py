@@ -5,6 +5,7 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -281,3 +282,17 @@ def test_that_the_parser_leaves_settings_that_were_not_given_alone():
     args = make_parser().parse_args(["detect", "a.laz", "-o", "b"])
     assert isinstance(args, argparse.Namespace)
     assert all(v is None for name, v in vars(args).items() if name.startswith(SETTING))
+
+
+@pytest.mark.parametrize("is_first", [True, False])
+def test_that_only_a_first_detection_says_that_it_compiles(
+    scan_file, detections, tmp_path, capsys, monkeypatch, is_first
+):
+    store = tmp_path / "store"
+    store.mkdir()
+    if not is_first:
+        (store / "neighbours.fit_planes-12.py311.nbi").touch()
+    kernel = SimpleNamespace(stats=SimpleNamespace(cache_path=str(store)))
+    monkeypatch.setattr("pipecore.cli.detect.fit_planes", kernel)
+    assert run("detect", scan_file, "-o", tmp_path / "report") == 0
+    assert ("compiles its kernels" in capsys.readouterr().err) == is_first
