@@ -49,6 +49,8 @@ class Canvas(QVTKRenderWindowInteractor):
     hovered = Signal(QPointF)
     left = Signal()
     before_frame = Signal()
+    settled = Signal()
+    """The camera has rested for a while, and all there is time for is drawn."""
     drawn = Signal(float)
     """A frame was drawn; the seconds that it took."""
 
@@ -235,6 +237,12 @@ class Canvas(QVTKRenderWindowInteractor):
     def _settle(self) -> None:
         self.seconds_to_draw = SETTLED_SECONDS
         self.draw()
+        self.settled.emit()
+
+    def settle_again(self) -> None:
+        """Take what is drawn as new: it has changed while the camera rests."""
+        if not self.is_moving:
+            self._settling.start()
 
     # Mouse
 

@@ -4,7 +4,6 @@ import threading
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -12,20 +11,19 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pipecore.geometry import Array
 from pipecore.types import NO_ID, PointCloud
 from pipegui import theme
-from pipegui.colour_maps import Colours
 from pipegui.document import Background, Box, Measurement, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.clipping import BoxFrame
-from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.decorations import Decorations
 from pipegui.scene.glimpse import Glimpse
+from pipegui.scene.layers import Layers
 from pipegui.scene.legend import make_legend
 from pipegui.scene.measure_marks import MeasureMark, lines_of
 from pipegui.scene.overlay import Overlay, label_of
-from pipegui.scene.picking import pick_point, warm_up
+from pipegui.scene.picking import warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
 from pipegui.view_state import SceneState
@@ -45,8 +43,6 @@ HINTS = {
 """Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
-NO_LIMIT = 2**31
-COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 
 
 class SceneView(QWidget):
@@ -73,12 +69,10 @@ class SceneView(QWidget):
         self._hovered = -1
         self.canvas = Canvas(self)
         self.overlay = Overlay(self.canvas)
-        self.points = PointLayer(self.canvas.layers[0])
+        self.layers = Layers(self.canvas, self)
         self._decorations = Decorations(self.canvas.layers)
         self._frame = BoxFrame(self.canvas.layers[1])
         self._glimpse = Glimpse(self.canvas.layers[0])
-        self._preview = PointLayer(self.canvas.layers[0])
-        """All points, in the box or not, while the box is dragged."""
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.canvas)
@@ -91,11 +85,14 @@ class SceneView(QWidget):
         self.canvas.hovered.connect(self._wait_for_hover)
         self.canvas.left.connect(self._stop_hovering)
         self.canvas.before_frame.connect(self._prepare_frame)
-        self.canvas.drawn.connect(self.points.learn)
-        self.canvas.drawn.connect(self._preview.learn)
         self.setAccessibleName("3D view")
         self._warming = threading.Thread(target=warm_up, name="warm up picking", daemon=True)
         self._warming.start()
+
+    @property
+    def points(self) -> PointLayer:
+        """The points of the whole cloud."""
+        return self.layers.whole
 
     # States
 
@@ -109,8 +106,8 @@ class SceneView(QWidget):
         self.canvas.is_parallel = state.view.is_parallel
         self.canvas.eye_dome = state.view.eye_dome
         is_new_cloud = state.cloud is not before.cloud
-        self._update_points(state, before, is_new_cloud=is_new_cloud, is_new_theme=is_new_theme)
-        self._decorations.dark = self.overlay.dark = background in IS_DARK
+        self.layers.dark = self._decorations.dark = self.overlay.dark = background in IS_DARK
+        self.layers.update(state, before, everything=is_new_theme)
         self._decorations.update(state, before, everything=is_new_theme or is_new_cloud)
         self._show_box(state.view.clip_box)
         self._update_overlay(state)
@@ -119,38 +116,6 @@ class SceneView(QWidget):
         elif state.selection != before.selection:
             self._aim(state)
         self.canvas.draw()
-
-    def _update_points(
-        self, state: SceneState, before: SceneState, *, is_new_cloud: bool, is_new_theme: bool
-    ) -> None:
-        cloud, view = state.cloud, state.view
-        if cloud is None:
-            self.points.forget()
-            self._preview.forget()
-            return
-        is_new_result = state.result is not before.result
-        is_recoloured = (
-            is_new_theme
-            or is_new_result
-            or any(getattr(view, name) != getattr(before.view, name) for name in COLOURING)
-        )
-        hidden, box = view.hidden_elements, view.clip_box
-        is_other_subset = (
-            hidden != before.view.hidden_elements
-            or (hidden and is_new_result)
-            or box != before.view.clip_box
-        )
-        if is_new_cloud or is_other_subset:
-            visible = visible_points(cloud, state.result, hidden, box)
-            self.points.set_points(cloud, visible, self._colour)
-        elif is_recoloured:
-            self.points.set_colours(self._colour)
-
-    def _colour(self, rows: NDArray[np.intp]) -> Colours:
-        state = self._state
-        assert state.cloud is not None
-        dark = self._background in IS_DARK
-        return colour_points(state.cloud, state.result, state.view, dark=dark, rows=rows)
 
     def _update_overlay(self, state: SceneState) -> None:
         self.overlay.legend, self.overlay.labels = None, ()
@@ -271,17 +236,8 @@ class SceneView(QWidget):
 
     def _prepare_frame(self) -> None:
         canvas, projection = self.canvas, self.canvas.projection()
-        if not canvas.is_software:
-            self.points.most = NO_LIMIT
-        self.points.show(
-            seconds=canvas.seconds_to_draw,
-            pixel_size=projection.pixel_size(canvas.pose.distance),
-            visible=self._state.view.show_points and not len(self._preview),
-            size=self._state.view.point_size,
-        )
-        if len(self._preview):
-            self._preview.show(seconds=0.0, pixel_size=projection.pixel_size(canvas.pose.distance))
-        self._decorations.prepare(moving=canvas.is_moving, point_px=self.points.point_px)
+        self.layers.show(projection)
+        self._decorations.prepare(moving=canvas.is_moving, point_px=self.layers.shown.point_px)
         self.overlay.follow(projection, canvas.pose)
 
     # Clipping
@@ -302,18 +258,15 @@ class SceneView(QWidget):
         handle = clipping.handle_at(box, projection, start)
         if handle < 0:
             return None
-        visible = visible_points(state.cloud, state.result, state.view.hidden_elements)
-        self._preview.seconds_per_point = self.points.seconds_per_point
-        self._preview.set_points(state.cloud, visible, self._colour)
-        self._preview.clip(box)
+        self.layers.begin_preview(box)
 
         def drag(now: QPointF, is_over: bool) -> None:
             dragged = clipping.drag(box, handle, projection, start, (now.x(), now.y()))
             if is_over:
-                self._preview.clear_actors()
+                self.layers.preview.clear_actors()
                 self.clip_dragged.emit(dragged)
             else:
-                self._preview.clip(dragged)
+                self.layers.preview.clip(dragged)
                 self._show_box(dragged)
 
         return drag
@@ -322,16 +275,10 @@ class SceneView(QWidget):
 
     def pick(self, position: QPointF) -> int:
         """Index in the cloud of the point that is seen at `position`, -1 if there is none."""
-        return self._pick(position, self.points.parts)
-
-    def _pick(self, position: QPointF, parts: list[NDArray[np.float32]]) -> int:
-        if not parts or not self._state.view.show_points:
-            return -1
-        row = pick_point(parts, self.canvas.projection(), (position.x(), position.y()))
-        return self.points.cloud_index(row) if row >= 0 else -1
+        return self.layers.pick(position)
 
     def _point_under(self, position: QPointF) -> Array | None:
-        index = self._pick(position, self.points.quick_parts)
+        index = self.layers.pick(position, quick=True)
         if index < 0 or self._state.cloud is None:
             return None
         return self._state.cloud.xyz[index].astype(np.float64)
@@ -360,7 +307,7 @@ class SceneView(QWidget):
     def _hover(self) -> None:
         if self._hover_at is None:
             return
-        index = self._pick(self._hover_at, self.points.quick_parts)
+        index = self.layers.pick(self._hover_at, quick=True)
         if index >= 0 or self._hovered >= 0:
             self.hovered.emit(index)
         self._hovered = index
@@ -391,9 +338,8 @@ class SceneView(QWidget):
         self._hover_timer.stop()
         self._decorations.clear()
         self._frame.show(None, (0.0, 0.0, 0.0))
-        self._preview.forget()
+        self.layers.forget()
         self._glimpse.clear()
-        self.points.forget()
         self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)

@@ -381,3 +381,42 @@ def test_that_parts_of_a_scan_are_seen_while_it_is_read(qtbot, no_leaks):
     assert len(view._glimpse) == 0
     assert view.points.n_shown > 0
     view.close()
+
+
+def test_that_all_points_in_the_picture_are_drawn_once_a_close_view_rests(
+    qtbot, no_leaks, monkeypatch
+):
+    monkeypatch.setattr("pipegui.scene.layers.NO_LIMIT", 30_000)
+    cloud, result = make_scan(60_000)
+    view = SceneView()
+    qtbot.addWidget(view)
+    view.resize(640, 480)
+    view.points.most = 30_000
+    with qtbot.waitExposed(view):
+        view.show()
+    view.apply(scene_state(cloud=cloud, result=result))
+    settle(qtbot, view)
+    assert view.points.n_shown < 60_000
+    # The whole is in the picture: nothing to be gained there. Then near a pipe:
+    index = int(np.flatnonzero(result.element_id == 7)[200])
+    close = poses.zoom(view.canvas.pose, 0.25, cloud.xyz[index].astype(float))
+    view.canvas.move_to(close)
+    qtbot.waitUntil(lambda: view.layers.close_up.n_shown > 0, timeout=10_000)
+    pixels, depth = view.canvas.projection().to_screen(cloud.xyz.astype(float))
+    inside = ((pixels >= 0) & (pixels <= [640, 480])).all(axis=1) & (depth > 0)
+    assert view.layers.close_up.n_shown == pytest.approx(inside.sum(), abs=3)
+    assert view.points.n_shown == 0
+    # A point that only the close view draws is picked.
+    drawn = {view.points.cloud_index(row) for row in range(len(view.points.parts[0]))}
+    front = [i for i in np.flatnonzero(inside) if i not in drawn]
+    hits = 0
+    for i in front[:200:10]:
+        at = QPointF(*pixels[i])
+        hits += view.pick(at) in front
+    assert hits > 0
+    view.canvas.move_to(view.canvas.pose)
+    with qtbot.waitSignal(view.canvas.drawn):
+        view.canvas.draw()
+    assert view.layers.close_up.n_shown == 0
+    assert view.points.n_shown > 0
+    view.close()

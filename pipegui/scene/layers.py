@@ -1,0 +1,144 @@
+"""The points of the 3D view, in whichever of three layers suits the moment."""
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtCore import QObject, QPointF
+
+from pipegui.colour_maps import Colours
+from pipegui.document import Box
+from pipegui.scene.canvas import Canvas
+from pipegui.scene.colouring import colour_points, visible_points
+from pipegui.scene.details import Details, Mask
+from pipegui.scene.picking import pick_point
+from pipegui.scene.point_layer import PointLayer
+from pipegui.scene.projection import Projection
+from pipegui.view_state import SceneState
+
+COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
+NO_LIMIT = 2**31
+
+
+class Layers(QObject):
+    """The cloud as a whole, a close-up of what is in the picture, and a preview.
+
+    The close-up is for clouds of which not all points can be drawn; it comes once the
+    camera has settled. The preview is for dragging the clip box: it has the points in
+    the box and out of it.
+    """
+
+    def __init__(self, canvas: Canvas, parent: QObject) -> None:
+        super().__init__(parent)
+        self._canvas = canvas
+        self._state = SceneState()
+        self.dark = False
+        """Whether it is drawn on a dark background."""
+        self.whole, self.close_up, self.preview = (PointLayer(canvas.layers[0]) for _ in range(3))
+        self.shown = self.whole
+        self._details = Details(self)
+        self._details.found.connect(self._show_close_up)
+        canvas.settled.connect(self._look_closer)
+        for layer in (self.whole, self.close_up, self.preview):
+            canvas.drawn.connect(layer.learn)
+
+    def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
+        """Show the points of `state` where they differ from `before`."""
+        self._state = state
+        cloud, view = state.cloud, state.view
+        if cloud is None:
+            self.forget()
+            return
+        is_new_result = state.result is not before.result
+        is_recoloured = (
+            everything
+            or is_new_result
+            or any(getattr(view, name) != getattr(before.view, name) for name in COLOURING)
+        )
+        hidden = view.hidden_elements
+        is_other_subset = (
+            cloud is not before.cloud
+            or hidden != before.view.hidden_elements
+            or (hidden and is_new_result)
+            or view.clip_box != before.view.clip_box
+        )
+        if is_other_subset:
+            self.whole.set_points(cloud, self._visible(view.clip_box), self._colour)
+        elif is_recoloured:
+            self.whole.set_colours(self._colour)
+        else:
+            return
+        self._end_close_up()
+        self._canvas.settle_again()
+
+    def show(self, projection: Projection) -> None:
+        """Draw the layer that suits the moment, with as many points as there is time for."""
+        canvas, view = self._canvas, self._state.view
+        if not canvas.is_software:
+            self.whole.most = self.close_up.most = NO_LIMIT
+        if canvas.is_moving:
+            self._end_close_up()
+        layers = (self.preview, self.close_up, self.whole)
+        self.shown = next(layer for layer in layers if len(layer) or layer is self.whole)
+        for layer in layers:
+            layer.show(
+                seconds=0.0 if layer is self.preview else canvas.seconds_to_draw,
+                pixel_size=projection.pixel_size(canvas.pose.distance),
+                visible=view.show_points and layer is self.shown,
+                size=view.point_size,
+            )
+
+    def pick(self, position: QPointF, *, quick: bool = False) -> int:
+        """Index in the cloud of the point seen at `position`, -1 for none.
+
+        Quick is among those points only that are drawn while the camera moves.
+        """
+        layer = self.close_up if len(self.close_up) and not quick else self.whole
+        parts = layer.quick_parts if quick else layer.parts
+        if not parts or not self._state.view.show_points:
+            return -1
+        row = pick_point(parts, self._canvas.projection(), (position.x(), position.y()))
+        return layer.cloud_index(row) if row >= 0 else -1
+
+    def begin_preview(self, box: Box) -> None:
+        """Draw what is in the box, of points that need not have been in it before."""
+        if self._state.cloud is not None:
+            self.preview.seconds_per_point = self.whole.seconds_per_point
+            self.preview.set_points(self._state.cloud, self._visible(None), self._colour)
+            self.preview.clip(box)
+
+    def forget(self) -> None:
+        """Let go of the cloud."""
+        self._end_close_up()
+        self._details.close()
+        self._state = SceneState()
+        for layer in (self.whole, self.close_up, self.preview):
+            layer.forget()
+
+    def _visible(self, box: Box | None) -> Mask | None:
+        state = self._state
+        if state.cloud is None:
+            return None
+        return visible_points(state.cloud, state.result, state.view.hidden_elements, box)
+
+    def _colour(self, rows: NDArray[np.int32]) -> Colours:
+        state = self._state
+        assert state.cloud is not None
+        return colour_points(state.cloud, state.result, state.view, dark=self.dark, rows=rows)
+
+    def _look_closer(self) -> None:
+        """Begin to draw all points in the picture, if not all of the cloud are drawn."""
+        canvas, cloud, view = self._canvas, self._state.cloud, self._state.view
+        if cloud is None or not view.show_points or self.whole.n_shown == len(self.whole):
+            return
+        size = (canvas.width(), canvas.height())
+        box = view.clip_box
+        self._details.look(cloud.xyz, canvas.projection(), size, lambda: self._visible(box))
+
+    def _show_close_up(self, mask: Mask) -> None:
+        if self._state.cloud is not None and not self._canvas.is_moving:
+            self.close_up.seconds_per_point = self.whole.seconds_per_point
+            self.close_up.set_points(self._state.cloud, mask, self._colour)
+            self._canvas.draw()
+
+    def _end_close_up(self) -> None:
+        self._details.stop()
+        self.close_up.clear_actors()
