@@ -101,7 +101,7 @@ def detect(
         chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):
         pieces = find_pieces(ellipses, chains, progress)
-        nearby = NearbyPoints(cloud, surface)
+        nearby = NearbyPoints(cloud, surface, progress=progress)
         built = build_elements(pieces, nearby, settings.elements, progress)
         profiles = tabulate_ellipses(built.elements, ellipses)
     with _timed(seconds, "deformations"):

@@ -10,6 +10,7 @@ from pipecore._kernels import nearby as kernels
 from pipecore._kernels.grouping import group_by_label
 from pipecore.elements.surfaces import SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
+from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
 from pipecore.surface.grid import GridFrame, VoxelCounter, table_of
 from pipecore.types import PointCloud
@@ -23,6 +24,9 @@ REACH_OF_SPHERE = 1.2
 """The same of a sphere."""
 CELL_VOXELS, COARSE = 6.0, 4
 """Edge of the cells in which thinned points are looked up, in voxels; coarse ones in fine ones."""
+
+AT_ONCE, BEGUN = 2_000_000, 0.3
+"""Points put into cells between two words to the progress, and what it is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +84,8 @@ class NearbyPoints:
     behind : (ndarray, ndarray), optional
         The cloud's points in the order of their thinned points, and where those of each
         begin, if known; by default found from `surface.parent`.
+    progress : Progress
+        Told now and then while the points are put into cells.
     """
 
     def __init__(
@@ -87,6 +93,7 @@ class NearbyPoints:
         cloud: PointCloud,
         surface: Surface,
         behind: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
+        progress: Progress = NoProgress(),
     ) -> None:
         self._cloud = cloud
         self.surface = surface
@@ -98,7 +105,10 @@ class NearbyPoints:
         first, _, n_y, n_z = frame.numbers
         counter = VoxelCounter(frame)
         cell = np.empty(len(surface.xyz), np.int32)
-        counter.add(surface.xyz, 0, len(cell), cell)
+        for start in range(0, len(cell), AT_ONCE):
+            progress.update("elements", BEGUN)
+            counter.add(surface.xyz, start, min(start + AT_ONCE, len(cell)), cell)
+        progress.update("elements", BEGUN)
         numbers = counter.keys
         place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
         coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
@@ -113,6 +123,7 @@ class NearbyPoints:
         )  # fmt: skip
         rank = np.empty(len(order), np.int32)
         rank[order] = np.arange(len(order), dtype=np.int32)
+        progress.update("elements", BEGUN)
         self._cells: tuple[Indices, Indices] = group_by_label(rank[cell], len(order))
 
     def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:

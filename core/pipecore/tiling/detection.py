@@ -91,7 +91,7 @@ def detect_in_tiles(
         with _timed(seconds, "elements"):
             pieces = find_pieces(ellipses, chains, progress)
             nearby = NearbyPoints(
-                cloud, tiled.surface, (store.open("members"), store.open("starts"))
+                cloud, tiled.surface, (store.open("members"), store.open("starts")), progress
             )
             built = build_elements(pieces, nearby, settings.elements, progress)
             profiles = tabulate_ellipses(built.elements, ellipses)
