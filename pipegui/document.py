@@ -80,6 +80,11 @@ class Selection:
     others: frozenset[int] = frozenset()
     """More elements, for what is done with several; everything is shown of `element_id`."""
 
+    @property
+    def lead(self) -> "Selection":
+        """The one thing that is looked at, without the others."""
+        return replace(self, others=frozenset())
+
     def parent(self) -> "Selection":
         """What Esc goes to: profile → deformation → element → run → nothing."""
         if self.others:

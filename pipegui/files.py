@@ -14,7 +14,10 @@ N_RECENT = 10
 def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
     """Ask for scans to open."""
     names, _ = QFileDialog.getOpenFileNames(
-        parent, "Open laser scans", _last_folder(settings), file_filter()
+        parent,
+        "Open laser scans",
+        _last_folder(settings),
+        f"{file_filter()};;Projects (*{SUFFIX})",
     )
     paths = [Path(name) for name in names]
     if paths:

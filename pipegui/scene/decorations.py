@@ -138,8 +138,10 @@ class Decorations:
                 thinned = rows[:: -(-len(rows) // limit)]
                 self._accented[moving] = _points(state.cloud.xyz[thinned], accent)
                 yield 0, self._accented[moving]
-        yield 1, _lines(shapes.axis_lines((element,)), accent, 2.5)
-        yield 1, _lines(shapes.end_rings(element), accent, 2.0)
+        marked = [e for e in state.result.elements if e.element_id in state.selection.others]
+        yield 1, _lines(shapes.axis_lines((element, *marked)), accent, 2.5)
+        for each in (element, *marked):
+            yield 1, _lines(shapes.end_rings(each), accent, 2.0)
 
     def _stack_profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         """The one profile of a stack: its curves in their colours, and its ellipses."""

@@ -113,7 +113,7 @@ class SceneView(QWidget):
         self._update_overlay(state)
         if is_new_cloud and state.scan_key != before.scan_key:
             self.canvas.fly_to(self._fitted(self.canvas.pose), fly=False)
-        elif state.selection != before.selection:
+        elif state.selection.lead != before.selection.lead:
             self._aim(state)
         self.canvas.draw()
 
