@@ -1,7 +1,6 @@
 """Free ellipses by the method of the settings, one for each group of points."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +28,7 @@ def fit_free_ellipses(
     starts : ndarray of int, shape (m + 1,)
         Where each group starts; the last entry is n. No group is empty.
     is_wanted : ndarray of bool, shape (m,)
-        Groups that are worth the time of a nonlinear fit, tens of milliseconds each.
+        Groups that are worth the time of a fit: a nonlinear one takes tens of milliseconds.
     method : EllipseFit
     check : callable
         Called before each nonlinear fit; may raise to cancel.
@@ -37,21 +36,28 @@ def fit_free_ellipses(
     Returns
     -------
     PlaneEllipses
-        nan where there is none; by a nonlinear method also where the points do not carry
-        one, or are not wanted.
+        nan where there is none or none is wanted; by a nonlinear method also where the points
+        do not carry one.
 
     References
     ----------
     Paper, section 3.3.3, methods 1 and 2.
     """
-    ellipses = fit_direct_ellipses(points, starts)
-    if method is EllipseFit.DIRECT:
-        return ellipses
     m = len(is_wanted)
-    found = replace(
-        ellipses, centre=np.full((m, 2), np.nan), **{k: np.full(m, np.nan) for k in _NUMBERS}
-    )
-    for i in np.flatnonzero(is_wanted):
+    found = PlaneEllipses(np.full((m, 2), np.nan), *(np.full(m, np.nan) for _ in _NUMBERS))
+    wanted = np.flatnonzero(is_wanted)
+    if method is EllipseFit.DIRECT:
+        if len(wanted) == 0:
+            return found
+        sizes = np.diff(starts)[wanted]
+        own_starts = np.concatenate([[0], np.cumsum(sizes)])
+        rows = np.arange(own_starts[-1]) + np.repeat(starts[wanted] - own_starts[:-1], sizes)
+        direct = fit_direct_ellipses(points[rows], own_starts)
+        found.centre[wanted] = direct.centre
+        for name in _NUMBERS:
+            getattr(found, name)[wanted] = getattr(direct, name)
+        return found
+    for i in wanted:
         check()
         fit = fit_nonlinear_ellipse(
             points[starts[i] : starts[i + 1]], robust=method is EllipseFit.ROBUST

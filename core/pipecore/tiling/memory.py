@@ -10,8 +10,8 @@ from pipecore.settings import TilingSettings
 
 GIB = 2**30
 
-ONE_PIECE_BYTES = 400
-"""A detection in one piece takes about this much a point: measured, see docs/performance.md."""
+ONE_PIECE_BYTES = 200
+"""A detection in one piece takes at most this much a point: measured, see docs/performance.md."""
 BASE_BYTES = 400 * 2**20
 """The program itself with its libraries and compiled kernels."""
 KEPT_BYTES = 8

@@ -51,8 +51,11 @@ def test_that_only_wanted_groups_get_the_time_of_a_slow_fit(rng):
     )  # fmt: skip
     assert_array_equal(np.isnan(found.semi_minor), [True, False, True])
     assert len(checks) == 1
-    direct = fit_free_ellipses(points, starts, np.zeros(3, np.bool_), EllipseFit.DIRECT)
-    assert_array_equal(direct.semi_minor, fit_direct_ellipses(points, starts).semi_minor)
+    direct = fit_free_ellipses(points, starts, np.array([True, False, True]), EllipseFit.DIRECT)
+    every = fit_direct_ellipses(points, starts)
+    assert_array_equal(direct.semi_minor, np.where([1, 0, 1], every.semi_minor, np.nan))
+    none = fit_free_ellipses(points, starts, np.zeros(3, np.bool_), EllipseFit.DIRECT)
+    assert np.isnan(none.semi_minor).all()
 
 
 def test_that_slow_fits_can_be_cancelled(rng):
