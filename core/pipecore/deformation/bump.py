@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import leastsq
 
 from pipecore._kernels import bumps as kernels
 from pipecore.geometry import Array
@@ -272,18 +272,21 @@ def _fit(
 
     scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
 
-    answer = least_squares(
+    # What `least_squares` calls with method "lm", without what it does around each call.
+    p, *_ = leastsq(
         residuals,
         first,
-        jacobian,
-        method="lm",
-        x_scale=scale,
-        max_nfev=60,
+        Dfun=jacobian,
+        full_output=True,
         ftol=1e-5,
         xtol=1e-5,
+        gtol=1e-8,
+        maxfev=60,
+        diag=1.0 / scale,
     )
-    information = answer.jac.T @ answer.jac
-    return _Fit(answer.x, np.linalg.inv(information), 2 * float(answer.cost), form)
+    left, slope = residuals(p), jacobian(p)
+    covariance = np.asarray(np.linalg.inv(slope.T @ slope), np.float64)
+    return _Fit(p, covariance, float(left @ left), form)
 
 
 def _thin(

@@ -1,6 +1,7 @@
 """The deviation map: signed distances from the contour in cells over chainage and clock."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,7 +128,7 @@ class DeviationMap:
     count: Array
     disputed: Flags
 
-    @property
+    @cached_property
     def covered(self) -> Flags:
         """Cells with points, small holes between sparse points closed."""
         return close_holes(self.count > 0)
