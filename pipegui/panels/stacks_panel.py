@@ -8,7 +8,6 @@ from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QHideEvent, QShowEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QGridLayout,
     QHBoxLayout,
     QHeaderView,
     QLabel,
@@ -19,11 +18,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipecore.settings import DirectionPreset, ProfileMethod
+from pipecore.settings import DirectionPreset
 from pipecore.types import NO_ID, Stack
 from pipegui import theme
+from pipegui.panels.cutting_fields import CuttingFields
 from pipegui.panels.stack_editor import StackEditor
-from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
+from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
 from pipegui.plan_state import PlanState
 from pipegui.view_state import StacksState
 
@@ -82,7 +82,8 @@ class StacksPanel(QWidget):
         )
         self.preset.setMinimumContentsLength(8)
         self.preset.currentIndexChanged.connect(self._tell_preset)
-        self._make_cutting()
+        self.cutting = CuttingFields()
+        self.cutting.changed.connect(self.setting_changed)
         self.list = QTreeWidget()
         self.list.setAccessibleName("Stacks")
         self.list.setHeaderLabels(["Stack", "Width", "Profiles", "Cut"])
@@ -123,54 +124,6 @@ class StacksPanel(QWidget):
         self._state = StacksState()
         self._list(self._state)
 
-    def _make_cutting(self) -> None:
-        """Fields for how profiles are cut and joined."""
-        self.width_mm = self._length("Profile width", "stacks.width_mm")
-        self.width_mm.setToolTip("Thickness of a profile; 0 follows the spacing of the points")
-        self.gap_mm = self._length("Largest gap", "profiles.gap_mm")
-        self.gap_mm.setToolTip(
-            "Points of one curve are at most this far apart; 0 follows the spacing of the points"
-        )
-        self.method = QuietComboBox()
-        self.method.setAccessibleName("Method")
-        self.method.setToolTip(
-            "Proximity alone, or proximity and splitting where the curvature changes sharply"
-        )
-        for method in ProfileMethod:
-            self.method.addItem(str(method).capitalize(), method)
-        self.method.currentIndexChanged.connect(
-            lambda _: self._tell_setting(
-                "profiles.method", ProfileMethod(self.method.currentData())
-            )
-        )
-        self._cutting = QGridLayout()
-        self._cutting.setContentsMargins(theme.SPACING, 0, theme.SPACING, 0)
-        self._cutting.setSpacing(theme.SPACING // 2)
-        for place, (text, field, span) in enumerate(
-            (("Width", self.width_mm, 1), ("Gap", self.gap_mm, 1), ("Method", self.method, 3))
-        ):
-            label = QLabel(text)
-            label.setBuddy(field)
-            row, column = divmod(place, 2)
-            self._cutting.addWidget(label, row, 2 * column)
-            self._cutting.addWidget(field, row, 2 * column + 1, 1, span)
-        for column in (1, 3):
-            self._cutting.setColumnStretch(column, 1)
-
-    def _length(self, name: str, key: str) -> QuietSpinBox:
-        field = QuietSpinBox()
-        field.setAccessibleName(name)
-        field.setRange(0, 1000)
-        field.setSuffix(" mm")
-        field.setSpecialValueText("automatic")
-        field.setMinimumWidth(8 * theme.SPACING)
-        field.valueChanged.connect(lambda value: self._tell_setting(key, value))
-        return field
-
-    def _tell_setting(self, key: str, value: object) -> None:
-        if not self._applying:
-            self.setting_changed.emit(key, value)
-
     def _button(self, icon: str, tip: str, act: Callable[[], None]) -> QToolButton:
         button = QToolButton()
         button.setIcon(theme.icon(icon))
@@ -195,7 +148,7 @@ class StacksPanel(QWidget):
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(theme.SPACING // 2)
         column.addLayout(top)
-        column.addLayout(self._cutting)
+        column.addWidget(self.cutting)
         column.addWidget(self.editor)
         column.addWidget(self.list, 1)
         column.addWidget(self._empty, 1)
@@ -204,10 +157,7 @@ class StacksPanel(QWidget):
     def apply(self, state: StacksState) -> None:
         """Show a state."""
         before, self._state = self._state, state
-        with self._applying:
-            self.width_mm.setValue(state.settings.width_mm)
-            self.gap_mm.setValue(state.profiles.gap_mm)
-            self.method.setCurrentIndex(self.method.findData(state.profiles.method))
+        self.cutting.apply(state)
         if self._waits_for_points and state.measured not in (None, before.measured):
             self._take_points(state)
         as_before = {"shown_stack": before.shown_stack, "measured": before.measured}

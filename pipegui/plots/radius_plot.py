@@ -1,7 +1,5 @@
 """Radius against profile of the selected element, as the paper draws it, and of pinned ones."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal
@@ -16,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.geometry import Array
-from pipecore.report.format import cell, format_measure
+from pipecore.report.format import format_measure
 from pipecore.types import Element, Profiles
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
@@ -24,7 +22,8 @@ from pipegui.colours import VERDICT
 from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, faint, small
 from pipegui.plots.export import Table
-from pipegui.plots.pattern import Pattern, index_at, pattern_of
+from pipegui.plots.pattern import index_at, pattern_of
+from pipegui.plots.radius_curves import Curve, key_of, range_of, table_of
 from pipegui.view_state import RadiusPlotState
 
 EMPTY = "Select an element to see its radius from profile to profile."
@@ -45,17 +44,6 @@ SERIES = {
 }
 """What can be shown, by name."""
 AT_FIRST = frozenset(SERIES) - {"free_radius", "difference"}
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """One element's profiles as they are plotted."""
-
-    element: Element
-    profiles: Profiles
-    pattern: Pattern
-    x: Array
-    colour: QColor
 
 
 class RadiusPlot(Chart):
@@ -311,19 +299,19 @@ class RadiusPlot(Chart):
         parts = []
         if self.shows("semi_minor"):
             name = "semi-minor axis" if not self._pinned else curve.element.label
-            parts.append(_key("●", data, name))
-        parts += [_key("●", c.colour, c.element.label) for c in self._pinned]
+            parts.append(key_of("●", data, name))
+        parts += [key_of("●", c.colour, c.element.label) for c in self._pinned]
         if self.shows("free_radius"):
             violet = QColor(*QUALITATIVE[-1].tolist())
-            parts.append(_key("◇", violet, "free circle"))
+            parts.append(key_of("◇", violet, "free circle"))
         if self.shows("fitted"):
-            parts.append(_key("━", theme.colour("text"), "fitted"))
+            parts.append(key_of("━", theme.colour("text"), "fitted"))
         if self.shows("band"):
-            parts.append(_key("╍", data, "") + _key("▒", faint(data, 1), scatter))
+            parts.append(key_of("╍", data, "") + key_of("▒", faint(data, 1), scatter))
         limit = self._state.dent_limit
         if self.shows("limit") and limit is not None:
             text = f"limit for dents {1000 * limit.depth:.1f} mm"
-            parts.append(_key("╍", QColor(VERDICT["reject"]), text))
+            parts.append(key_of("╍", QColor(VERDICT["reject"]), text))
             self.key.setToolTip(limit.text)
         self.key.setText("&nbsp; ".join(parts))
 
@@ -332,18 +320,13 @@ class RadiusPlot(Chart):
         curve = self._curve
         if curve is None:
             return
-        lows, highs = [], []
-        for one in (curve, *self._pinned):
-            values = self._level(one, one.pattern.values)
-            values = values[np.isfinite(values)]
-            if not len(values):
-                continue
-            fitted = self._level(one, one.pattern.fitted)
-            low, high = np.percentile(values, [2, 98])
-            low, high = min(low, fitted.min()), max(high, fitted.max())
-            room = max(0.6 * (high - low), 4 * one.pattern.spread, 0.5)
-            lows.append(max(values.min(), low - room))
-            highs.append(min(values.max(), high + room))
+        ranges = [
+            range_of(
+                self._level(one, one.pattern.values), self._level(one, one.pattern.fitted), one
+            )
+            for one in (curve, *self._pinned)
+        ]
+        lows, highs = ([r[end] for r in ranges if r is not None] for end in (0, 1))
         if not lows:
             return
         if self.shows("limit") and self._state.dent_limit is not None:
@@ -370,28 +353,7 @@ class RadiusPlot(Chart):
 
     def numbers(self) -> Table:
         """The profiles of the element and of the pinned ones."""
-        table: dict[str, list[str]] = {}
-
-        def put(title: str, cells: list[str]) -> None:
-            table.setdefault(title, []).extend(cells)
-
-        def put_numbers(title: str, values: Array, decimals: int) -> None:
-            put(title, [cell(float(v), decimals) for v in values])
-
-        for curve in (self._curve, *self._pinned) if self._curve else ():
-            rows, pattern = curve.profiles, curve.pattern
-            put("element", [curve.element.label] * len(rows))
-            put("profile_index", [str(i) for i in rows.profile_index])
-            put_numbers("chainage_m", rows.chainage, 4)
-            put_numbers("semi_minor_mm", pattern.values, 3)
-            put_numbers("semi_minor_sd_mm", pattern.sd, 3)
-            put_numbers("radius_mm", 1000 * rows.radius, 3)
-            put_numbers("radius_sd_mm", 1000 * rows.radius_sd, 3)
-            put_numbers("fitted_mm", pattern.fitted, 3)
-            put_numbers("centre_deviation_mm", 1000 * rows.centre_deviation, 3)
-            put_numbers("ovality_pct", 100 * rows.ovality, 3)
-            put_numbers("arc_deg", np.rad2deg(rows.arc), 1)
-        return table
+        return table_of([self._curve, *self._pinned] if self._curve is not None else [])
 
     # Mouse
 
@@ -428,9 +390,3 @@ class RadiusPlot(Chart):
         )
         metrics = QFontMetrics(self.readout.font())
         return metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.readout.width())
-
-
-def _key(sign: str, colour: QColor, text: str) -> str:
-    """Part of the key: a sign in its colour and what it stands for."""
-    coloured = f'<span style="color:{colour.name()}">{sign}</span>'
-    return f"{coloured}&nbsp;{text.replace(' ', '&nbsp;')}" if text else coloured

@@ -216,12 +216,12 @@ def test_that_width_gap_and_method_are_set_here(qtbot, document):
     panel = panel_of(qtbot, document)
     told = []
     panel.setting_changed.connect(lambda *args: told.append(args))
-    for field, text in ((panel.width_mm, "25"), (panel.gap_mm, "40")):
+    for field, text in ((panel.cutting.width_mm, "25"), (panel.cutting.gap_mm, "40")):
         field.setFocus()
         field.selectAll()
         qtbot.keyClicks(field, text)
         qtbot.keyClick(field, Qt.Key.Key_Return)
-    qtbot.keyClicks(panel.method, "Prox")
+    qtbot.keyClicks(panel.cutting.method, "Prox")
     assert told == [
         ("stacks.width_mm", 25.0),
         ("profiles.gap_mm", 40.0),
@@ -229,7 +229,7 @@ def test_that_width_gap_and_method_are_set_here(qtbot, document):
     ]
     changed = commands.change_settings(document, {"profiles.gap_mm": 33.0})
     panel.apply(resolve(changed).stacks)
-    assert panel.gap_mm.value() == 33.0
+    assert panel.cutting.gap_mm.value() == 33.0
     assert len(told) == 3
 
 
