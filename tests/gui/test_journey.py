@@ -9,6 +9,8 @@ from PySide6.QtCore import QPoint, Qt
 
 from pipegui.document import ColourBy, Selection
 from pipegui.parts import make_parts
+from pipegui.scene.canvas import SETTLED_SECONDS
+from pipegui.scene.colouring import PROFILE_COLOURS
 from tests.factories import make_cloud, make_result
 
 LEFT = Qt.MouseButton.LeftButton
@@ -27,12 +29,13 @@ def real_window(make_window):
 
 
 def wait_until_drawn(window, qtbot):
-    """Wait until two looks at the 3D view see the same."""
+    """Wait until the camera has settled and two looks at the 3D view see the same."""
     looks = [window.parts.scene.screenshot()]
 
     def is_still():
         looks.append(window.parts.scene.screenshot())
-        return looks[-1] == looks[-2]
+        is_settled = window.parts.scene.canvas.seconds_to_draw == SETTLED_SECONDS
+        return is_settled and looks[-1] == looks[-2]
 
     qtbot.waitUntil(is_still, timeout=20_000)
     return looks[-1]
@@ -114,4 +117,12 @@ def test_that_colours_stacks_and_hiding_change_the_picture_and_undo_brings_it_ba
     assert (pixels(wait_until_drawn(window, qtbot)) == first).all(axis=2).mean() > 0.999
     window.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
     assert window.document.view.colour_by is ColourBy.PROFILE
-    assert (first != pixels(wait_until_drawn(window, qtbot))).any(axis=2).mean() > 0.01
+
+    def share_of(colour, picture):
+        return (np.abs(picture.astype(int) - colour).max(axis=2) < 12).mean()
+
+    # The view is lower now, by the slider over the profiles.
+    shown = pixels(wait_until_drawn(window, qtbot))
+    blue_to_red = PROFILE_COLOURS[1][::-1]
+    assert share_of(blue_to_red, first) < 0.001
+    assert share_of(blue_to_red, shown) > 0.005
