@@ -14,6 +14,10 @@ from numba import njit
 from pipecore._kernels.circles import geometric_circle, taubin_circle
 from pipecore._kernels.eigen import eigenvalues, eigenvector
 
+MIN_PAIR_COS = 0.94
+"""Normals of two points whose cosine is larger tell no axis."""
+COS_HALF_PAIR = 0.985
+"""Normals that are all closer than this to one direction are so close to each other too."""
 MAX_FAILURES = 2
 """A curve is left alone after this many draws in which no piece of it was found."""
 
@@ -102,7 +106,7 @@ def pick_pair(normals, free, state):
             + normals[i, 1] * normals[j, 1]
             + normals[i, 2] * normals[j, 2]
         )
-        if abs(cos) < 0.94:
+        if abs(cos) < MIN_PAIR_COS:
             return state, i, j
     return state, -1, -1
 
@@ -245,6 +249,23 @@ def share_on_one_circle(uv, normals, tolerance, min_cos_tilt):
 
 
 @njit(cache=True, nogil=True)
+def is_flat(normals, free):
+    """Whether the free points' normals are so alike that no two of them tell an axis."""
+    n = normals.shape[0]
+    x = y = z = 0.0
+    for k in range(n):
+        if free[k]:
+            a, b, c = normals[k, 0], normals[k, 1], normals[k, 2]
+            sign = 1.0 if a * x + b * y + c * z >= 0.0 else -1.0
+            x, y, z = x + sign * a, y + sign * b, z + sign * c
+    least = COS_HALF_PAIR * math.sqrt(x * x + y * y + z * z)
+    for k in range(n):
+        if free[k] and not abs(normals[k, 0] * x + normals[k, 1] * y + normals[k, 2] * z) > least:
+            return False
+    return True
+
+
+@njit(cache=True, nogil=True)
 def split_curves(
     uv,
     normals,
@@ -277,6 +298,8 @@ def split_curves(
         n_free = n
         number = n_failed = 0
         while number < max_pieces and n_failed < MAX_FAILURES and n_free >= min_points:
+            if is_flat(normals[a:b], free):
+                break
             count = best_circle(
                 uv[a:b],
                 normals[a:b],

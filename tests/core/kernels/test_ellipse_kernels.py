@@ -161,3 +161,44 @@ def test_that_the_best_circle_has_most_points_and_only_free_ones(rng):
     assert best(free) == 10
     assert list(np.flatnonzero(inliers)) == list(range(30, 40))
     assert best(np.zeros(40, np.bool_)) == 0
+
+
+@pytest.mark.parametrize("spread_deg", [4.0, 9.9, 25.0])
+def test_that_a_flat_curve_has_no_pair_that_tells_an_axis(rng, spread_deg):
+    n = 60
+    mean = unit_rows(rng.normal(size=(1, 3)))[0]
+    off = np.radians(rng.uniform(0, spread_deg, n))
+    across = unit_rows(np.cross(mean, rng.normal(size=(n, 3))))
+    normals = np.cos(off)[:, None] * mean + np.sin(off)[:, None] * across
+    normals[::3] *= -1
+    free = rng.uniform(size=n) < 0.8
+    # What is not free does not count.
+    normals[~free] = unit_rows(rng.normal(size=(n, 3)))[~free]
+    cos = np.abs(normals[free] @ normals[free].T)
+    is_flat = kernels.is_flat(normals, free)
+    assert is_flat == (spread_deg < 8.0) or spread_deg == 9.9
+    if is_flat:
+        assert cos.min() >= kernels.MIN_PAIR_COS
+    _, i, j = kernels.pick_pair(normals, free, np.uint64(7))
+    assert not is_flat or (i, j) == (-1, -1)
+
+
+def test_that_the_turn_on_a_circle_counts_points_that_lie_on_it_and_face_its_centre(rng):
+    axis, r = axis_of(25.0, 40.0), 0.1
+    angles = rng.uniform(0, np.pi, 80)
+    uv, normals = cut_cylinder(axis, np.array([0.3, -0.2]), r, angles)
+    uv[::5] += 0.03
+    normals[::7] = unit_rows(rng.normal(size=normals[::7].shape))
+    x, y, mx, my = (np.empty(80) for _ in range(4))
+    tu, tv = kernels.look_along(uv, normals, *axis, x, y, mx, my)
+    cx, cy = x[1] - r * mx[1], y[1] - r * my[1]
+    is_on = np.array(
+        [kernels.fits_circle(*row, cx, cy, r, 0.004, 0.9) for row in zip(x, y, mx, my, strict=True)]
+    )
+    assert 20 < is_on.sum() < 70
+    theta = np.arctan2(y - cy, x - cx)[is_on]
+    expected = len(theta) - abs(np.exp(2j * theta).sum())
+    turn = kernels.turn_on_circle(
+        *uv.T.copy(), *normals.T.copy(), tu, tv, axis[2], np.hypot(*axis[:2]), cx, cy, r, 0.004, 0.9
+    )
+    assert turn == pytest.approx(expected)

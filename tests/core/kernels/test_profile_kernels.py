@@ -154,3 +154,15 @@ def test_that_points_are_sorted_by_profile_and_cell(rng):
     step = np.diff(cells[order], axis=0)
     assert_allclose(np.diff(keys)[same], (step[:, 0] * n_v + step[:, 1])[same])
     assert n_v >= np.ptp(cells[:, 1]) + 12
+
+
+def test_that_groups_are_gathered_with_their_profiles(rng):
+    points = rng.permutation(20).astype(np.int32)
+    uv, normals = rng.normal(size=(20, 2)), rng.normal(size=(20, 3))
+    profile = np.repeat([4, 5], 10).astype(np.int32)
+    members, starts = np.array([3, 1, 7, 15, 11]), np.array([0, 3, 5])
+    of, places, vectors, index = profiles.gather(points, uv, normals, profile, members, starts)
+    assert list(of) == list(points[members])
+    assert_allclose(places, uv[members])
+    assert_allclose(vectors, normals[members])
+    assert list(index) == [4, 5]

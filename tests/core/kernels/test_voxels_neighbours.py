@@ -223,3 +223,12 @@ def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):
     true = cKDTree(xyz).query(sample, k)[0][:, -1]
     assert_allclose(reach, np.where(true <= edge, true, np.nan))
     assert np.isfinite(reach).sum() > 0
+
+
+def test_that_sums_are_those_of_the_points_within_reach(rng):
+    xyz, p, reach = rng.uniform(0, 1, (50, 3)), np.array([0.4, 0.5, 0.6]), 0.4
+    near = xyz[np.linalg.norm(xyz - p, axis=1) <= reach] - p
+    n, *sums = neighbours.sums_within(*xyz.T.copy(), *p, reach**2)
+    assert n == len(near) > 5
+    products = near.T @ near
+    assert_allclose(sums, [*near.sum(axis=0), *products[np.triu_indices(3)]], atol=1e-12)
