@@ -33,6 +33,10 @@ STRAIN_SIGNIFICANCE = 5.0
 MIN_DEPTH_SD = 3.0
 """A depth has to be this many times its standard deviation."""
 
+MIN_DENT_ARC = np.deg2rad(100.0)
+MAX_UNTOLD = 0.2
+"""Where less arc is seen, the contour follows a dent; told of an element if a fifth is so."""
+
 MIN_BOW_LENGTH = 6.0
 """In diameters: the line of a shorter stub hangs on what touches it."""
 
@@ -131,6 +135,7 @@ def find_deformations(
         _as_deformation(element, surface, contour, p, settings)
         for p in patches
         if abs(p.bump.height) >= max(least, MIN_DEPTH_SD * p.bump.height_sd)
+        and _arc_at(heights, p) >= MIN_DENT_ARC
     ]
     ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
     deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
@@ -157,10 +162,37 @@ def find_deformations(
         straightness,
         {
             name: why
-            for name, why in {"ovality": why_no_ovality, "straightness": why_not_straight}.items()
-            if why and name in _applicable(element)
-        },
+            for name, why in {
+                "ovality": why_no_ovality,
+                "straightness": why_not_straight,
+                "dents": _why_no_dents(heights),
+            }.items()
+            if why and (name in _applicable(element) or name == "dents")
+        }
+        if element.kind in SEARCHED
+        else {},
     )
+
+
+def _arcs(heights: DeviationMap) -> Array:
+    """Arc that is seen at each row, radians."""
+    return np.asarray(np.count_nonzero(heights.covered, axis=1) * heights.grid.column_angle)
+
+
+def _arc_at(heights: DeviationMap, patch: Patch) -> float:
+    """Arc that is seen along a bump, radians: the median over its rows."""
+    grid = heights.grid
+    reach = max(patch.span / 2, grid.row_size)
+    return float(np.median(_arcs(heights)[np.abs(grid.chainages - patch.chainage) <= reach]))
+
+
+def _why_no_dents(heights: DeviationMap) -> str:
+    """Why dents cannot be told along a good part of an element."""
+    short = float(np.mean(_arcs(heights) < MIN_DENT_ARC))
+    if short < MAX_UNTOLD:
+        return ""
+    needed = np.rad2deg(MIN_DENT_ARC)
+    return f"less than {needed:.0f}° of arc seen over {100 * short:.0f} % of the length"
 
 
 def _applicable(element: Element) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipecore.deformation.bump import Bump, fit_bump
+from pipecore.deformation.bump import TYPICAL_EXTENT, Bump, fit_bump
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid, dilate
 from pipecore.deformation.matched_filter import Candidate, disc, find_candidates
 from pipecore.deformation.reference import Contour, fit_contour
@@ -151,8 +151,11 @@ def _measure(
     clock = float(np.mod(seen.clock + bump.around / radius, 2 * np.pi))
     scale = float(stretch(element, clock))
     chainage = seen.chainage + bump.along / scale
-    # Noise alone gains one unit of z² by each of the four parameters of place and size.
-    z_squared = bump.height**2 / (bump.noise**2 + contour_sd**2) - 4.0
+    # Noise alone gains one unit of z² by each of the four parameters of place and size, and
+    # the smaller a bump, the more places there are for one: twice the logarithm of their number.
+    places = (TYPICAL_EXTENT * 2 * radius) ** 2 / (bump.length * bump.width)
+    z_squared = bump.height**2 / (bump.noise**2 + contour_sd**2)
+    z_squared -= 4.0 + 2.0 * max(float(np.log(places)), 0.0)
     z = float(np.sign(bump.height) * np.sqrt(max(z_squared, 0.0)))
     patch = Patch(chainage, clock, radius, bump, z, scale)
     n_closed = _seen_sides(cells, cells.deviation - contour.height, patch)

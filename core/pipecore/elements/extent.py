@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from pipecore._kernels import extent as kernels
 
@@ -19,6 +20,9 @@ MIN_COVERED_ARC = float(np.deg2rad(50.0))
 """... or 0.8 of what it usually shows."""
 SHARE_OF_ARC = 0.45
 """A step of axis is covered if it shows this share of the arc that the element usually shows."""
+OVAL_ARC = float(np.deg2rad(200.0))
+MAX_OVAL = 0.05
+"""From this arc on an oval section can be told, up to this amplitude in radii."""
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
@@ -108,9 +112,14 @@ def find_extent(
     usual_arc = float(np.quantile(arc[is_core], 0.75))
     # Half of normal residuals are below 0.67 sigma.
     off = _median_by_row(np.abs(residual), row, n_rows)
+    max_off = 1.2 * sigma + min(0.006 * radius, 0.0015)
+    if np.any((off >= max_off) & (arc > OVAL_ARC)):
+        # An oval stretch of a pipe is off the circle, and still the pipe.
+        oval = _oval_by_row(clock, residual, row, n_rows, radius)
+        off = np.minimum(off, _median_by_row(np.abs(residual - oval), row, n_rows))
     is_covered = (
         (arc >= max(SHARE_OF_ARC * usual_arc, min(MIN_COVERED_ARC, 0.8 * usual_arc)))
-        & (off < 1.2 * sigma + min(0.006 * radius, 0.0015))
+        & (off < max_off)
         & (turning_by_row(clock, lean, row, n_rows) > MIN_TURNING)
     )
     covered = np.flatnonzero(is_covered)
@@ -153,6 +162,36 @@ def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int
     turning = np.empty(n_rows)
     kernels.turn_of_normals(clock, lean, row, turning)
     return turning
+
+
+def _oval_by_row(
+    clock: Array, residual: Array, row: NDArray[np.intp], n_rows: int, radius: float
+) -> Array:
+    """What an oval section adds to each point's residual; zero where the arc cannot tell.
+
+    Only the second harmonic is taken, up to an ovality of 10 %: a change of radius or of
+    centre is another element.
+    """
+    sector = (clock / (2 * np.pi) * MAX_SECTORS).astype(np.intp) % MAX_SECTORS
+    cell = row * MAX_SECTORS + sector
+    count = np.bincount(cell, minlength=n_rows * MAX_SECTORS).reshape(n_rows, MAX_SECTORS)
+    total = np.bincount(cell, residual, minlength=n_rows * MAX_SECTORS).reshape(count.shape)
+    # Three rows together hold enough points.
+    count = uniform_filter1d(count.astype(np.float64), 3, axis=0, mode="nearest")
+    total = uniform_filter1d(total, 3, axis=0, mode="nearest")
+    seen = count > 0
+    can_tell = seen.sum(axis=1) * (2 * np.pi / MAX_SECTORS) > OVAL_ARC
+    mean = np.where(seen, total / np.where(seen, count, 1.0), 0.0)
+    angle = (np.arange(MAX_SECTORS) + 0.5) * (2 * np.pi / MAX_SECTORS)
+    terms = [np.ones_like(angle), *(f(k * angle) for k in (1, 2) for f in (np.cos, np.sin))]
+    design = np.stack(terms, axis=1)
+    normal = np.einsum("rs,sj,sk->rjk", seen[can_tell].astype(np.float64), design, design)
+    right = (mean[can_tell] * seen[can_tell]) @ design
+    second = np.zeros((n_rows, 2))
+    second[can_tell] = np.linalg.solve(normal + 1e-6 * np.eye(5), right[..., None])[:, 3:, 0]
+    size = np.hypot(second[:, 0], second[:, 1])
+    second *= (size < MAX_OVAL * radius)[:, None]
+    return np.asarray(second[row, 0] * np.cos(2 * clock) + second[row, 1] * np.sin(2 * clock))
 
 
 def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:

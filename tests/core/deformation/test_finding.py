@@ -272,3 +272,29 @@ def test_that_a_dent_without_strain_says_why(rng):
         if found.kind is DeformationKind.DENT and found.depth < 5 * found.depth_sd:
             assert "standard deviations" in found.not_measurable["strain"]
             assert np.isnan(found.strain)
+
+
+def test_that_dents_are_not_told_where_too_little_arc_is_seen(rng):
+    narrow = dented(-0.012, arc=np.deg2rad(85))
+    narrow.views = (0.2,)
+    finding = find(narrow.scan(rng))
+    assert DeformationKind.DENT not in {d.kind for d in finding.deformations}
+    assert "100° of arc seen over" in finding.not_measurable["dents"]
+    assert "dents" not in find(dented(-0.012).scan(rng)).not_measurable
+
+
+def test_that_a_dent_whose_bottom_is_not_seen_has_no_depth(rng):
+    scene = dented(-0.02, size=0.14, radius=0.11)
+    scan = scene.scan(rng)
+    s, _, clock = scan.element.axis.pipe_coordinates(scan.xyz)
+    turn = np.mod(clock - 0.2 + np.pi, 2 * np.pi) - np.pi
+    # A rope hides the bottom.
+    seen = np.hypot((s - 0.8) / 0.07, turn * 0.11 / 0.07) > 0.62
+    hidden = replace(scan, xyz=scan.xyz[seen], normals=scan.normals[seen])
+    dents = [d for d in find(hidden).deformations if d.kind is DeformationKind.DENT]
+    for dent in dents:
+        assert np.isnan(dent.depth)
+        assert np.isnan(dent.volume)
+        assert dent.not_measurable["depth"] == "too few points at its peak"
+    (whole,) = find(scan).deformations
+    assert whole.depth == pytest.approx(0.02, rel=0.1)

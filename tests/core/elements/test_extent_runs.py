@@ -54,6 +54,32 @@ def test_that_a_gap_is_reported_with_its_place(rng):
     assert (a, b) == pytest.approx((0.3, 0.6), abs=0.04)
 
 
+def bent_points(rng, low, high, arc, waves, amplitude=0.0045):
+    """Points of a wall that leaves the circle by so many waves around it."""
+    chainage, clock, residual, lean = wall_points(rng, low, high, arc)
+    return chainage, clock, residual + amplitude * np.cos(waves * clock), lean
+
+
+def test_that_an_oval_stretch_is_still_the_pipe_where_the_arc_can_tell(rng):
+    def end_of(arc, waves):
+        round_part = wall_points(rng, 0.0, 1.0, arc)
+        return extent_of(round_part, bent_points(rng, 1.0, 1.8, arc, waves)).high
+
+    # 9 % of ovality.
+    assert end_of(2 * np.pi, 2) == pytest.approx(1.8, abs=0.02)
+    assert end_of(np.radians(240.0), 2) == pytest.approx(1.8, abs=0.03)
+    # Half of it could as well be something else, and what is square or three-sided is.
+    assert end_of(np.pi, 2) == pytest.approx(1.0, abs=0.05)
+    assert end_of(2 * np.pi, 3) == pytest.approx(1.0, abs=0.05)
+    assert end_of(2 * np.pi, 4) == pytest.approx(1.0, abs=0.05)
+
+
+def test_that_another_radius_is_not_taken_for_ovality(rng):
+    arc = 2 * np.pi
+    wider = bent_points(rng, 1.0, 1.8, arc, 0)
+    assert extent_of(wall_points(rng, 0.0, 1.0, arc), wider).high == pytest.approx(1.0, abs=0.05)
+
+
 def test_that_points_beyond_a_long_gap_are_of_something_else(rng):
     extent = extent_of(wall_points(rng, 0.0, 1.0), wall_points(rng, 1.7, 2.5))
     assert extent.high == pytest.approx(1.0, abs=0.02)
