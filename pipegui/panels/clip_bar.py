@@ -25,6 +25,7 @@ class ClipBar(QWidget):
         super().__init__(parent)
         self._applying = Applying()
         self._origin = np.zeros(3)
+        self._box: Box | None = None
         row = QHBoxLayout(self)
         row.setContentsMargins(theme.SPACING, 2, theme.SPACING, 2)
         row.setSpacing(theme.SPACING // 2)
@@ -33,13 +34,16 @@ class ClipBar(QWidget):
         for name in self._names:
             row.addWidget(name)
             self.ends.append([QuietSpinBox() for _ in range(2)])
-            for field in self.ends[-1]:
+            for side, field in enumerate(self.ends[-1]):
                 field.setDecimals(2)
                 field.setRange(-1e9, 1e9)
                 field.setSingleStep(STEP)
                 field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
                 field.setMinimumWidth(7 * theme.SPACING)
-                field.valueChanged.connect(self._tell)
+                axis = len(self.ends) - 1
+                field.valueChanged.connect(
+                    lambda value, axis=axis, side=side: self._tell(axis, side, value)
+                )
                 row.addWidget(field, 1)
         self.whole = self._button("All", self.whole_requested)
         self.selection = self._button("Selection", self.selection_requested)
@@ -50,6 +54,7 @@ class ClipBar(QWidget):
 
     def apply(self, state: ClipState) -> None:
         """Show a state."""
+        self._box = state.box
         self.setVisible(state.box is not None)
         self.selection.setEnabled(state.has_selection)
         if state.box is None or state.cloud is None:
@@ -71,11 +76,11 @@ class ClipBar(QWidget):
         button.clicked.connect(signal)
         return button
 
-    def _tell(self) -> None:
-        if self._applying:
+    def _tell(self, axis: int, side: int, value: float) -> None:
+        """Move one face; the others keep what the fields round."""
+        if self._applying or self._box is None:
             return
-        low, high = (
-            tuple(self.ends[axis][side].value() - float(self._origin[axis]) for axis in range(3))
-            for side in (0, 1)
-        )
+        ends = [list(self._box.low), list(self._box.high)]
+        ends[side][axis] = value - float(self._origin[axis])
+        low, high = (tuple(end) for end in ends)
         self.changed.emit(Box(low, high))
