@@ -190,6 +190,8 @@ class SectionView(Chart):
             is_depth = dimension.name in ("Depth", "Height")
             pen = pg.mkPen(text_colour, width=2 if is_depth else 1)
             self.plot.plot(*ends.T, pen=pen, symbol="+", symbolSize=7, symbolPen=pen)
+            if not is_depth and self.canvas.height() < ROOM_FOR_BOTH:
+                continue  # they would lie on each other; the line below the plot has them
             # Labels of crossing diameters stand off the centre, towards different ends.
             share = 0.0 if is_depth else 0.28 + 0.44 * (number % 2)
             anchor = _outward_anchor(ends[0], cut.reference) if is_depth else (0.5, 0.5)
@@ -204,13 +206,23 @@ class SectionView(Chart):
         cut = self._state.cut
         is_wanted = self._shows("curvature") and cut is not None and cut.curve is not None
         is_shown = is_wanted and self.canvas.height() >= ROOM_FOR_BOTH
-        self.curvature.setVisible(is_shown)
-        self.curvature.setMaximumHeight(16_777_215 if is_shown else 0)
+        # What is merely hidden keeps its room.
+        layout = self.canvas.ci
+        if is_shown and not self._has_curvature():
+            layout.addItem(self.curvature, 1, 0)
+        elif not is_shown and self._has_curvature():
+            layout.removeItem(self.curvature)
+        layout.layout.setRowStretchFactor(1, 1 if is_shown else 0)
+        layout.layout.invalidate()
+        layout.layout.activate()
         return is_shown
+
+    def _has_curvature(self) -> bool:
+        return self.canvas.ci.getItem(1, 0) is not None
 
     def _refit(self) -> None:
         """Leave the curvature out of a small panel."""
-        if self._state.cut is not None and self.curvature.isVisible() != self._give_room():
+        if self._state.cut is not None and self._has_curvature() != self._give_room():
             self._redraw()
 
     def _draw_curvature(self, cut: SectionCut) -> None:
