@@ -1,9 +1,9 @@
 """LAS and LAZ, by laspy and lazrs."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
@@ -24,8 +24,12 @@ LARGEST_PARALLEL_CHUNK = 2_000_000
 
 
 @contextmanager
-def open_source(path: Path) -> Iterator[Source]:
-    """Open a LAS or LAZ file; see `pipecore.io.registry.Format.open`."""
+def open_source(path: Path, rows: tuple[int, int] | None = None) -> Iterator[Source]:
+    """Open a LAS or LAZ file; see `pipecore.io.registry.Format.open`.
+
+    `rows` are the first point to give and the one behind the last: of LAZ, COPC included,
+    whole chunks, which its table of chunks finds; or from the first point on.
+    """
     with told_as_read_errors(path, "LAS"):
         import laspy  # noqa: PLC0415
 
@@ -34,15 +38,10 @@ def open_source(path: Path) -> Iterator[Source]:
         with told_as_read_errors(path, "LAS"):
             check_header(file, path)
             wanted = laspy.DecompressionSelection
-            reader = laspy.LasReader(
-                file,
-                closefd=False,
-                decompression_selection=wanted.base()
-                | wanted.Z
-                | wanted.CLASSIFICATION
-                | wanted.INTENSITY
-                | wanted.RGB,
+            selection = (
+                wanted.base() | wanted.Z | wanted.CLASSIFICATION | wanted.INTENSITY | wanted.RGB
             )
+            reader = laspy.LasReader(file, closefd=False, decompression_selection=selection)
             header = reader.header
             if header.are_points_compressed and header.point_count:
                 largest = check_chunks(file, path, header)
@@ -50,8 +49,13 @@ def open_source(path: Path) -> Iterator[Source]:
                     # In parallel, whole chunks of that size would be held in memory.
                     reader.laz_backend = (laspy.LazBackend.Lazrs,)
             bounds = np.array([header.mins, header.maxs])
+            read = reader.read_points
+            if rows is not None and rows[0] and header.are_points_compressed:
+                read = _whole_chunks(file, header, selection, rows)
+            elif rows is not None and rows[0]:
+                reader.seek(rows[0])
         yield Source(
-            chunks=_chunks(reader, path),
+            chunks=_chunks(header, read, path, rows or (0, header.point_count)),
             fields=tuple(header.point_format.dimension_names),
             n_points=header.point_count,
             bounds=bounds if np.isfinite(bounds).all() else None,
@@ -59,13 +63,79 @@ def open_source(path: Path) -> Iterator[Source]:
         )
 
 
-def _chunks(reader: "laspy.LasReader", path: Path) -> Iterator[Chunk]:
+def chunk_starts(path: Path) -> list[int]:
+    """Numbers of the points at which the chunks of a LAZ file begin; of a LAS file even ones.
+
+    Where one ends another begins; the last number is that of all points.
+    """
+    with told_as_read_errors(path, "LAS"), path.open("rb") as file:
+        import laspy  # noqa: PLC0415
+
+        check_header(file, path)
+        header = laspy.LasHeader.read_from(file)
+        n_points = int(header.point_count)
+        if not header.are_points_compressed or not n_points:
+            return [*range(0, n_points, CHUNK_POINTS), n_points]
+        return [0, *dict.fromkeys(end for end, _ in _chunk_ends(file, header) if end)]
+
+
+def _chunk_ends(file: BinaryIO, header: "laspy.LasHeader") -> list[tuple[int, int]]:
+    """For each chunk the points up to its end, and its size in bytes."""
+    import lazrs  # type: ignore[import-untyped]  # noqa: PLC0415
+
+    packing = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
+    file.seek(header.offset_to_point_data)
+    chunks = lazrs.read_chunk_table(file, packing)
+    # The last of chunks of equal size is said to be as large as the others.
+    ends = np.minimum(np.cumsum([n for n, _ in chunks]), header.point_count)
+    return list(zip(ends.tolist(), [n_bytes for _, n_bytes in chunks], strict=True))
+
+
+def _whole_chunks(
+    file: BinaryIO,
+    header: "laspy.LasHeader",
+    selection: "laspy.DecompressionSelection",
+    rows: tuple[int, int],
+) -> Callable[[int], Any]:
+    """A reader of the points of whole chunks, found by the table of chunks.
+
+    lazrs' own seeking misses the place where chunks differ in size.
+    """
+    import laspy  # noqa: PLC0415
+    import lazrs  # noqa: PLC0415
+
+    table: list[tuple[int, int]] = []
+    place, begin = header.offset_to_point_data + 8, 0
+    for end, n_bytes in _chunk_ends(file, header):
+        if begin < rows[0]:
+            place += n_bytes
+        elif begin < rows[1]:
+            table.append((end - begin, n_bytes))
+        begin = end
+    file.seek(place)
+    compressed = np.frombuffer(file.read(sum(n for _, n in table)), np.uint8)
+    raw = np.zeros((rows[1] - rows[0]) * header.point_format.size, np.uint8)
+    packing = header.vlrs[header.vlrs.index("LasZipVlr")].record_data
+    lazrs.decompress_points_with_chunk_table(compressed, packing, raw, table, selection.to_lazrs())
+    points = laspy.PackedPointRecord.from_buffer(raw, header.point_format)
+    n_given = 0
+
+    def read(n: int) -> Any:
+        nonlocal n_given
+        n_given += n
+        return points[n_given - n : n_given]
+
+    return read
+
+
+def _chunks(
+    header: "laspy.LasHeader", read: Callable[[int], Any], path: Path, rows: tuple[int, int]
+) -> Iterator[Chunk]:
     with told_as_read_errors(path, "LAS"):
-        header = reader.header
         names = set(header.point_format.dimension_names)
-        n_read = 0
-        while n_read < header.point_count:
-            points = reader.read_points(CHUNK_POINTS)
+        n_read, last = rows
+        while n_read < last:
+            points = read(min(CHUNK_POINTS, last - n_read))
             if not len(points):
                 raise truncated(path, header.point_count, n_read)
             n_read += len(points)
@@ -79,7 +149,7 @@ def _chunks(reader: "laspy.LasReader", path: Path) -> Iterator[Chunk]:
                 rgb = np.stack([points["red"], points["green"], points["blue"]], axis=1)
             yield Chunk(
                 xyz,
-                n_read / header.point_count,
+                (n_read - rows[0]) / (last - rows[0]),
                 intensity=np.asarray(points["intensity"], dtype=np.float32),
                 rgb=rgb,
                 classification=np.asarray(points["classification"], dtype=np.uint8),

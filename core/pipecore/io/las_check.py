@@ -99,10 +99,11 @@ def check_chunks(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> int:
     place = header.offset_to_point_data + 8
     size = path.stat().st_size
     n_layers = _count_layers(record, items)
-    for _, n_bytes in chunks:
+    for n_points, n_bytes in chunks:
         if place + n_bytes > size:
             raise damaged(path, "LAZ", "it is truncated")
-        if n_layers:
+        # Writers of chunks of unequal size, such as COPC's, may leave an empty one at the end.
+        if n_layers and (n_points or n_bytes):
             # Behind the first point, which is not compressed, and the number of points.
             file.seek(place + header.point_format.size + 4)
             layers = np.frombuffer(file.read(4 * n_layers), dtype="<u4")

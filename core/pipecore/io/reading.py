@@ -105,6 +105,11 @@ def _as_paths(paths: Paths) -> list[Path]:
     return files
 
 
+def first_origin(xyz: Array) -> Array:
+    """Origin of a cloud whose first points, in world coordinates and metres, are these."""
+    return np.asarray(np.round(np.median(xyz, axis=0) / ORIGIN_STEP) * ORIGIN_STEP + 0.0)
+
+
 class _Column:
     """An array that grows in place; rows that are never set stay zero."""
 
@@ -181,7 +186,7 @@ class _GrowingCloud:
         if not len(xyz):
             return
         if self.origin is None:
-            self.origin = np.round(np.median(xyz, axis=0) / ORIGIN_STEP) * ORIGIN_STEP + 0.0
+            self.origin = first_origin(xyz)
         local = xyz - self.origin
         if self.xyz.array.dtype == np.float32 and np.abs(local).max() > FLOAT32_REACH:
             self._widen_coordinates()

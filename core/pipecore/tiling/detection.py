@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore import io
 from pipecore.axes import join_centres
 from pipecore.elements import NearbyPoints, build_elements, find_pieces
 from pipecore.elements.sections import tabulate_ellipses
@@ -21,6 +20,7 @@ from pipecore.stacks import choose_stacks
 from pipecore.tiling import curves, thinning
 from pipecore.tiling.engine import start_engine
 from pipecore.tiling.memory import GIB, SHARE_OF_FREE, free_memory, tile_bytes
+from pipecore.tiling.reading import read_into_store
 from pipecore.tiling.store import Store, drop_pages, temporary_store
 from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
 from pipecore.types import PointCloud, Profiles, Result
@@ -68,9 +68,10 @@ def detect_in_tiles(
     seconds: dict[str, float] = {}
     with temporary_store(beside) as store:
         length_unit = settings.input.length_unit
-        cloud = io.read(paths, length_unit=length_unit, folder=store.folder, progress=progress)
         limit = int(settings.tiling.memory_gib * GIB) or int(SHARE_OF_FREE * free_memory())
         with start_engine(settings.tiling.scheduler, store) as engine:
+            cloud = read_into_store(engine, paths, length_unit, progress)
+            drop_pages(cloud.xyz)
             room = tile_bytes(len(cloud), limit, engine.n_at_once)
             slab_bytes, batch_bytes = _sizes(settings, room)
             with _timed(seconds, "surface"):

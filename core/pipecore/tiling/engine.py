@@ -1,8 +1,10 @@
 """Tiles on dask: threads of this process by default, any cluster by its address."""
 
 import logging
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipecore import parallel
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 PATIENCE = 0.2
 """Progress is reported, and cancelling noticed, at least this often, seconds."""
 _CONNECT_TIMEOUT = "5s"
+_ANY_PORT = "127.0.0.1:0"
 
 
 class Engine:
@@ -29,10 +32,19 @@ class Engine:
         Tiles that share one computer's memory at a time.
     """
 
-    def __init__(self, client: "Client", store: Store, n_at_once: int) -> None:
+    def __init__(
+        self, client: "Client", store: Store, n_at_once: int, *, is_local: bool = False
+    ) -> None:
         self._client = client
+        self._is_local = is_local
         self.store = store
         self.n_at_once = n_at_once
+
+    def sees(self, paths: Sequence[Path]) -> bool:
+        """Whether all workers can read these files."""
+        if self._is_local:
+            return True
+        return all(self._client.run(can_read, [path.absolute() for path in paths]).values())
 
     def run(
         self,
@@ -105,12 +117,12 @@ def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
                     n_workers=1,
                     threads_per_worker=n_threads,
                     processes=False,
-                    dashboard_address=None,
+                    dashboard_address=_ANY_PORT,
                     memory_limit=None,
                 ) as cluster,
                 Client(cluster) as client,
             ):
-                yield Engine(client, store, n_threads)
+                yield Engine(client, store, n_threads, is_local=True)
             return
         try:
             client = Client(scheduler, timeout=_CONNECT_TIMEOUT)
@@ -120,6 +132,11 @@ def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
             ) from error
         with client:
             yield Engine(client, store, _check_workers(client, scheduler, store))
+
+
+def can_read(paths: Sequence[Path]) -> bool:
+    """Whether this process can read files: asked of every worker."""
+    return all(os.access(path, os.R_OK) for path in paths)
 
 
 def _check_workers(client: "Client", scheduler: str, store: Store) -> int:

@@ -168,7 +168,7 @@ def test_that_a_cluster_by_its_address_finds_the_same(scanned, tmp_path):
     expected = detect(io.read(scanned), Settings())
     assert len(expected.elements) >= 1
     with LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
     ) as cluster:
         settings = Settings(
             tiling=TilingSettings(tile_mpoints=0.004, scheduler=cluster.scheduler_address)
