@@ -136,7 +136,12 @@ class Jobs(QObject):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something runs that was asked for; a glance does not count."""
+        """Whether something that was asked for runs or waits; a glance does not count."""
+        return self._is_told_of or bool(self._waiting)
+
+    @property
+    def _is_told_of(self) -> bool:
+        """Whether what runs was asked for."""
         return self._running is not None and not self._running.is_glance
 
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
@@ -214,7 +219,7 @@ class Jobs(QObject):
         if self._beside is not None:
             self._beside.cancel()
         if self._running is not None:
-            if self.is_busy:
+            if self._is_told_of:
                 self.cancelling.emit()
             self.worker.cancel()
 
@@ -232,6 +237,7 @@ class Jobs(QObject):
             self._next()
         elif self._running.is_glance:
             self.worker.cancel()
+            self.busy_changed.emit(self.is_busy)
 
     def _next(self) -> None:
         if self._waiting:
@@ -244,9 +250,9 @@ class Jobs(QObject):
 
     def _take(self, event: Event) -> None:
         match event:
-            case Started() if self.is_busy:
+            case Started() if self._is_told_of:
                 self.started.emit(event.title)
-            case Progressed() if self.is_busy:
+            case Progressed() if self._is_told_of:
                 self.progressed.emit(event)
             case Glimpsed():
                 self.glimpsed.emit(event.part)

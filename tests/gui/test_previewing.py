@@ -76,8 +76,11 @@ def test_that_a_glance_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
 
     jobs.glance(quick, told.append, told.append)
     assert running.wait(5)
+    started = QSignalSpy(jobs.started)
     with qtbot.waitSignal(jobs.detected, timeout=3000):
         jobs.detect(CLOUD, Settings())
+        assert jobs.is_busy  # though it has to wait for the glance to end
+    assert [started.at(i) for i in range(started.count())] == [["Detecting"]]
     qtbot.waitUntil(lambda: told == ["again"])
 
 
