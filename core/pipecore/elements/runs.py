@@ -104,38 +104,3 @@ def trim_to_tangent(
         LineAxis(line.at(low), line.direction, high - low),
         ArcAxis(arc.centre, arc.normal, turned, arc.bend_radius, last - first),
     )
-
-
-BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
-"""A branch leaves its run at this angle or more."""
-
-
-def branches(spans: list[Span]) -> list[tuple[int, int]]:
-    """Pairs (branch, straight): ends that run into the side of a straight of no smaller radius.
-
-    The branch's axis meets the straight's within a quarter of its radius, and the branch
-    ends where the straight's surface is, give or take half a radius.
-    """
-    found = []
-    for i, branch in enumerate(spans):
-        for end in (0, 1):
-            point = branch.axis.end if end else branch.axis.start
-            tangent = branch.axis.tangent(branch.axis.length if end else 0.0)
-            outward = tangent if end else -tangent
-            for j, main in enumerate(spans):
-                if i == j or not isinstance(main.axis, LineAxis):
-                    continue
-                radius = max(main.radii)
-                if branch.radii[end] > 1.05 * radius:
-                    continue
-                chainage, rho, _ = main.axis.pipe_coordinates(point[None])
-                beside = -0.5 * radius < chainage[0] < main.axis.length + 0.5 * radius
-                if not beside or not 0.5 * radius < rho[0] < 1.6 * radius:
-                    continue
-                across = np.cross(outward, main.axis.direction)
-                sine = float(np.linalg.norm(across))
-                towards = main.axis.at(chainage[0]) - point
-                skew = abs(float(towards @ across)) / max(sine, 1e-9)
-                if sine > BRANCH_SIN and skew < 0.25 * radius and towards @ outward > 0:
-                    found.append((i, j))
-    return found

@@ -1,0 +1,299 @@
+"""Bends between two straights: tangent to both, so that only the bend radius is unknown.
+
+A free torus on a bend of which little is seen has a bend radius that is hardly known, and
+takes in points of the straights beside it, which make it larger still. Straights that meet
+at an angle leave one unknown: the rounder the corner, the earlier the bend begins. Points
+before it must agree with the straights and points in it with the torus, for one bend radius.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.elements.extent import Extent, find_extent, section_misfit
+from pipecore.elements.fittings import End, StraightEnd, straight_ends
+from pipecore.elements.nearby import NearbyPoints
+from pipecore.elements.refine import RADIAL_COS, Fitted
+from pipecore.elements.surfaces import ArcSurface, LineSurface, SurfaceFit, robust_sigma
+from pipecore.geometry import ArcAxis
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+SAME_RADIUS = 0.06
+"""Pipes joined by a bend are of one radius to within this share, and so is the bend."""
+MIN_TURN, MAX_TURN = np.deg2rad(6.0), np.deg2rad(135.0)
+MAX_SKEW = 0.2
+"""Axes joined by a bend pass each other within this share of the radius."""
+BEND_RADII = np.geomspace(1.1, 11.0, 60)
+"""Bend radii tried, in radii of the pipe."""
+OVERSHOOT = 1.5
+"""A straight may have been followed this many radii into the bend."""
+N_STEPS = 6
+"""Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
+MIN_POINTS = 15
+MAX_POINTS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Corner:
+    """Where the axes of two straights meet.
+
+    Parameters
+    ----------
+    place : ndarray, shape (3,)
+    towards : tuple of ndarray
+        Unit vectors along both straights, towards the corner.
+    turn : float
+        Angle by which the pipe turns, radians.
+    radius : float
+        Of the pipe, metres.
+    sd : float
+        Standard deviation of the axes' distance from the place, metres.
+    """
+
+    place: Array
+    towards: tuple[Array, Array]
+    turn: float
+    radius: float
+    sd: float = 0.0
+
+    @property
+    def normal(self) -> Array:
+        """Unit normal of the plane of both axes, about which the bend turns."""
+        normal = np.cross(self.towards[0], -self.towards[1])
+        return np.asarray(normal / np.linalg.norm(normal))
+
+    @property
+    def half_tangent(self) -> float:
+        """Distance from the corner to where the bend begins, in bend radii."""
+        return float(np.tan(self.turn / 2))
+
+    def surface(self, bend_radius: float, radius: float) -> ArcSurface:
+        """The bend of a bend radius."""
+        inward = np.cross(self.normal, self.towards[0])
+        begin = self.place - bend_radius * self.half_tangent * self.towards[0]
+        return ArcSurface(begin + bend_radius * inward, self.normal, bend_radius, radius)
+
+    def axis(self, bend_radius: float) -> ArcAxis:
+        """Its axis from one straight to the other."""
+        inward = np.cross(self.normal, self.towards[0])
+        begin = self.place - bend_radius * self.half_tangent * self.towards[0]
+        return ArcAxis(begin + bend_radius * inward, self.normal, -inward, bend_radius, self.turn)
+
+
+def find_corners(
+    fitted: list[Fitted], nearby: NearbyPoints
+) -> Iterator[tuple[Corner, float, tuple[End, End]]]:
+    """Find pairs of straight ends that a bend may join, those with most points on it first.
+
+    Yields
+    ------
+    tuple of Corner, float, (End, End)
+        With the bend radius, of those tried, that most points agree with.
+    """
+    ends = straight_ends(fitted)
+    found = []
+    for a, one in enumerate(ends):
+        for other in ends[a + 1 :]:
+            between = corner_between(fitted, one, other, nearby)
+            if between is not None:
+                found.append((*between, (one.which, other.which)))
+    for _, corner, bend_radius, pair in sorted(found, key=lambda x: (-x[0], x[3])):
+        yield corner, bend_radius, pair
+
+
+def corner_between(
+    fitted: list[Fitted], one: StraightEnd, other: StraightEnd, nearby: NearbyPoints
+) -> tuple[int, Corner, float] | None:
+    """The corner that two ends make: number of points on its bend, corner, bend radius."""
+    smaller = min(one.radius, other.radius)
+    if one.which[0] == other.which[0] or abs(one.radius - other.radius) > SAME_RADIUS * smaller:
+        return None
+    turn = float(np.arccos(np.clip(-(one.outward @ other.outward), -1.0, 1.0)))
+    if not MIN_TURN < turn < MAX_TURN:
+        return None
+    ahead, ahead_other, skew = _closest(one.point, one.outward, other.point, other.outward)
+    radius = 0.5 * (one.radius + other.radius)
+    furthest = BEND_RADII[-1] * radius * np.tan(turn / 2)
+    if skew > MAX_SKEW * radius + 0.002:
+        return None
+    if min(ahead, ahead_other) < -OVERSHOOT * radius or max(ahead, ahead_other) > furthest:
+        return None
+    place = 0.5 * (one.point + ahead * one.outward + other.point + ahead_other * other.outward)
+    sd_one, sd_other = (axis_sd(fitted[e.which[0]], place) for e in (one, other))
+    corner = Corner(
+        place, (one.outward, other.outward), turn, radius, float(np.hypot(sd_one, sd_other))
+    )
+    best = _best_bend_radius(corner, max(ahead, ahead_other), nearby)
+    return None if best is None else (best[0], corner, best[1])
+
+
+def axis_sd(found: Fitted, place: Array) -> float:
+    """Standard deviation of a straight's axis abreast of a place, across it, metres."""
+    model, covariance = found.fit.model, found.fit.covariance
+    assert isinstance(model, LineSurface)
+    s = float((place - model.middle) @ model.direction)
+    variance = [
+        covariance[k, k] + 2 * s * covariance[k, k + 2] + s**2 * covariance[k + 2, k + 2]
+        for k in (0, 1)
+    ]
+    return float(np.sqrt(max(float(np.mean(variance)), 0.0)))
+
+
+def _closest(p: Array, u: Array, q: Array, v: Array) -> tuple[float, float, float]:
+    """Parameters of the closest points of the lines p + s·u and q + t·v, and their distance."""
+    w = p - q
+    b, d, e = float(u @ v), float(u @ w), float(v @ w)
+    det = 1.0 - b * b
+    s, t = (b * e - d) / det, (e - b * d) / det
+    return s, t, float(np.linalg.norm(w + s * u - t * v))
+
+
+def _best_bend_radius(corner: Corner, gap: float, nearby: NearbyPoints) -> tuple[int, float] | None:
+    """The bend radius that most points agree with, and how many; `gap` is to the further end."""
+    radius = corner.radius
+    tangent_max = min(BEND_RADII[-1] * radius * corner.half_tangent, gap + 3.0 * radius)
+    ball = nearby.within_ball(corner.place, tangent_max + 1.2 * radius)
+    xyz, normals = nearby.surface.xyz[ball], nearby.surface.normals[ball]
+    tolerance = max(3.0 * nearby.surface.noise, 0.03 * radius)
+    best: tuple[int, float] | None = None
+    for bend_radius in map(float, BEND_RADII * radius):
+        if bend_radius * corner.half_tangent > tangent_max:
+            break
+        residual, _, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
+        on = np.abs(residual) < tolerance
+        on &= np.abs(np.einsum("ij,ij->i", normals, outward)) > RADIAL_COS
+        if (on & in_bend).sum() >= 12 and (best is None or on.sum() > best[0]):
+            best = int(on.sum()), bend_radius
+    return best
+
+
+def pipe_residuals(
+    corner: Corner, bend_radius: float, radius: float, xyz: Array
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """Distances of points from straight, bend and straight as one pipe.
+
+    Returns
+    -------
+    tuple of ndarray
+        Signed distances (n,), derivatives by the bend radius (n,), outward unit vectors
+        (n, 3), and whether each point is abreast of the bend (n,).
+    """
+    q = xyz - corner.place
+    tangent = bend_radius * corner.half_tangent
+    before = [-(q @ t) > tangent for t in corner.towards]
+    # Beyond both tangent points, on the outside of the bend, is abreast of neither straight.
+    along = np.array([-(q @ t) for t in corner.towards])
+    first = before[0] & ((along[0] >= along[1]) | ~before[1])
+    second = before[1] & ~first
+    residual, jacobian, outward = corner.surface(bend_radius, radius).residuals(xyz)
+    # The centre moves away from the corner as the bend radius grows.
+    inward = np.cross(corner.normal, corner.towards[0])
+    shift = inward - corner.half_tangent * corner.towards[0]
+    by_bend_radius = jacobian[:, :3] @ shift + jacobian[:, 5]
+    for is_there, towards in ((first, corner.towards[0]), (second, corner.towards[1])):
+        line = LineSurface(corner.place, towards, corner.radius)
+        residual[is_there], _, outward[is_there] = line.residuals(xyz[is_there])
+        by_bend_radius[is_there] = 0.0
+    return residual, by_bend_radius, outward, ~(first | second)
+
+
+def fit_bend(
+    corner: Corner, bend_radius: float, nearby: NearbyPoints, usable: NDArray[np.bool_]
+) -> Fitted | None:
+    """Fit the bend radius, and the pipe's radius in the bend, to all points around a corner.
+
+    Parameters
+    ----------
+    corner : Corner
+    bend_radius : float
+        Where to start.
+    nearby : NearbyPoints
+    usable : ndarray of bool
+        Thinned points that are free or on the straights.
+
+    Returns
+    -------
+    Fitted or None
+        None where the points do not carry the bend radius. Its covariance is that of a
+        torus whose other parameters are known.
+    """
+    radius = corner.radius
+    sigma = max(nearby.surface.noise, 0.001, 0.01 * radius)
+    furthest = 1.4 * bend_radius * corner.half_tangent + radius
+    ball = nearby.within_ball(corner.place, furthest + 1.2 * radius)
+    ball = ball[usable[ball]]
+    _, xyz, normals = nearby.of_cloud(ball)
+    if len(xyz) > MAX_POINTS:
+        order = np.lexsort(xyz.T)[np.linspace(0, len(xyz) - 1, MAX_POINTS).astype(np.intp)]
+        xyz, normals = xyz[order], normals[order]
+    scale, bend_sd = 3.0 * sigma, np.inf
+    for _ in range(N_STEPS):
+        residual, slope, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
+        radial = np.abs(np.einsum("ij,ij->i", normals, outward)) > RADIAL_COS
+        near = radial & (np.abs(residual) < 4.685 * scale)
+        if (near & in_bend).sum() < MIN_POINTS:
+            return None
+        weight = np.square(1.0 - np.square(residual[near] / (4.685 * scale)))
+        design = np.stack([slope[near], -1.0 * in_bend[near]], axis=1)
+        normal_matrix = design.T @ (weight[:, None] * design)
+        if np.linalg.cond(normal_matrix) > 1e10:
+            return None
+        step = np.linalg.solve(normal_matrix, -design.T @ (weight * residual[near]))
+        bend_radius += float(np.clip(step[0], -0.2 * bend_radius, 0.2 * bend_radius))
+        radius += float(step[1])
+        shown = robust_sigma(residual[near])
+        scale = min(scale, max(shown, 0.7 * scale, 1e-5))
+        bend_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[0, 0]))
+        radius_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[1, 1]))
+        if not 1.02 * radius < bend_radius or abs(radius / corner.radius - 1) > SAME_RADIUS:
+            return None
+    # The corner's own uncertainty moves the bend by as much, and its radius by far more.
+    bend_sd = float(np.hypot(bend_sd, corner.sd / (1.0 / np.cos(corner.turn / 2) - 1.0)))
+    return _fitted(corner, bend_radius, radius, scale, (bend_sd, radius_sd), nearby, ball)
+
+
+def _fitted(
+    corner: Corner,
+    bend_radius: float,
+    radius: float,
+    sigma: float,
+    sds: tuple[float, float],
+    nearby: NearbyPoints,
+    ball: Indices,
+) -> Fitted | None:
+    axis, model = corner.axis(bend_radius), corner.surface(bend_radius, radius)
+    xyz, normals = nearby.surface.xyz[ball], nearby.surface.normals[ball]
+    residual, _, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
+    cosine = np.abs(np.einsum("ij,ij->i", normals, outward))
+    on = in_bend & (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
+    if on.sum() < MIN_POINTS:
+        return None
+    own = ball[on]
+    chainage, _, clock = axis.pipe_coordinates(xyz[on])
+    lean = lean_of(normals[on], outward[on], axis.tangent(chainage))
+    nothing = np.empty(0)
+    extent = find_extent(
+        chainage, clock, residual[on], lean, (nothing, nothing),
+        axis.length, radius, nearby.usual_spacing(own), sigma,
+    )  # fmt: skip
+    if extent is None:
+        return None
+    covered = extent.coverage * (extent.high - extent.low) / axis.length
+    extent = Extent(0.0, axis.length, extent.arc, min(covered, 1.0), extent.gaps)
+    covariance = np.zeros((7, 7))
+    covariance[5, 5], covariance[6, 6] = sds[0] ** 2, sds[1] ** 2
+    fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
+    misfit = section_misfit(clock, residual[on], extent.arc)
+    return Fitted(fit, axis, own, extent, misfit)
+
+
+def lean_of(normals: Array, outward: Array, tangent: Array) -> Array:
+    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
+    clockwise = np.cross(tangent, outward)
+    ahead = np.einsum("ij,ij->i", normals, clockwise)
+    out = np.einsum("ij,ij->i", normals, outward)
+    return np.asarray(np.arctan(ahead / np.where(out == 0.0, np.inf, out)))
