@@ -6,18 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
-from pipecore.elements.bends import Corner, corner_between, find_corners, fit_bend
-from pipecore.elements.credible import ROUGH, is_credible
-from pipecore.elements.fittings import End, propose_reducers, straight_ends
-from pipecore.elements.flanges import find_flanges, flanges
-from pipecore.elements.following import follow_end
+from pipecore.elements.flanges import flanges
 from pipecore.elements.joining import join_straights
 from pipecore.elements.keeping import refine_pieces
 from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.pieces import LONG_PIECE, Piece, find_pieces
-from pipecore.elements.refine import Fitted, refine_piece
+from pipecore.elements.pieces import Piece, find_pieces
+from pipecore.elements.refine import Fitted
 from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
-from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
+from pipecore.elements.surfaces import ArcSurface, LineSurface
 from pipecore.elements.tees import Junction, Part, cut_tees, find_junctions
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.progress import Progress

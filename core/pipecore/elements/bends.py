@@ -15,8 +15,14 @@ from numpy.typing import NDArray
 from pipecore.elements.extent import Extent, find_extent, section_misfit
 from pipecore.elements.fittings import End, StraightEnd, straight_ends
 from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.refine import RADIAL_COS, Fitted
-from pipecore.elements.surfaces import ArcSurface, LineSurface, SurfaceFit, robust_sigma
+from pipecore.elements.refine import RADIAL_COS, Fitted, axis_through
+from pipecore.elements.surfaces import (
+    ArcSurface,
+    LineSurface,
+    SurfaceFit,
+    fit_surface,
+    robust_sigma,
+)
 from pipecore.geometry import ArcAxis
 
 Array = NDArray[np.float64]
@@ -35,6 +41,8 @@ N_STEPS = 6
 """Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
 MIN_POINTS = 15
 MAX_POINTS = 20_000
+FREE_SD = 0.015
+"""A bend whose own points carry its bend radius to this share needs no straights for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,10 +292,14 @@ def _fitted(
         return None
     covered = extent.coverage * (extent.high - extent.low) / axis.length
     extent = Extent(0.0, axis.length, extent.arc, min(covered, 1.0), extent.gaps)
+    misfit = section_misfit(clock, residual[on], extent.arc)
+    free = fit_surface(model, nearby.of_cloud(own)[1], 3.0 * sigma)
+    if free is not None and np.sqrt(free.covariance[5, 5]) < FREE_SD * bend_radius:
+        ends = np.stack([axis.start, axis.end])
+        return Fitted(free, axis_through(free.model, ends), own, extent, misfit)
     covariance = np.zeros((7, 7))
     covariance[5, 5], covariance[6, 6] = sds[0] ** 2, sds[1] ** 2
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
-    misfit = section_misfit(clock, residual[on], extent.arc)
     return Fitted(fit, axis, own, extent, misfit)
 
 
