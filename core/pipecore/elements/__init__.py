@@ -28,6 +28,9 @@ SIZED = (ElementKind.CYLINDER, ElementKind.TORUS, ElementKind.TEE)
 """Kinds whose radius is a pipe's."""
 MIN_LENGTH = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
+LONE, LONG_ENOUGH = 3.0, 0.3
+"""What is part of no run is longer than this many radii, or metres: limbs and bodies are not.
+A reducer is always part of one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,13 +115,16 @@ def _is_tee(junction: Junction, kinds: list[ElementKind]) -> bool:
 def _is_reported(
     part: Part, kind: ElementKind, run: NDArray[np.int32], settings: ElementSettings
 ) -> bool:
-    """Whether an element stands for itself: short straights must be part of a run."""
-    if kind is not ElementKind.CYLINDER or part.is_tee:
+    """Whether an element stands for itself: what is short must be part of a run."""
+    if part.is_tee or kind in (ElementKind.SPHERE, ElementKind.FLANGE):
         return True
-    shortest = MIN_LENGTH * part.found.fit.model.radius
-    if (run == run[part.whole]).sum() == 1:
-        shortest = max(shortest, settings.min_length_mm / 1e3)
-    return part.found.axis.length >= shortest
+    radius, length = part.found.fit.model.radius, part.axis.length
+    is_alone = (run == run[part.whole]).sum() == 1
+    if is_alone and kind is ElementKind.CONE:
+        return False
+    if is_alone and length < max(settings.min_length_mm / 1e3, min(LONE * radius, LONG_ENOUGH)):
+        return False
+    return kind is not ElementKind.CYLINDER or length >= MIN_LENGTH * radius
 
 
 def _trimmed_to_fitting(

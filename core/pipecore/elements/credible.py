@@ -37,7 +37,7 @@ LONG = 3.0
 """... where a straight is longer than this many radii: no corner and no chance is."""
 MIN_BEND_RADIUS, MIN_BEND_LENGTH = 1.02, 0.4
 """In radii: a torus with less of a hole or a shorter axis is a chance."""
-MAX_WAVINESS = 0.009
+MAX_WAVINESS = 0.010
 """Largest standard deviation of a surface about its shape beyond noise, in radii."""
 MAX_BEND_RADIUS_SD = 0.3
 """Largest standard deviation of a bend radius, as a share of it."""

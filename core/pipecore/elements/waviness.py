@@ -19,11 +19,12 @@ CELL_WIDTH, SECTORS = 0.03, (12, 24)
 MIN_IN_CELL, MIN_CELLS = 4, 12
 OVAL_ARC = np.deg2rad(200.0)
 """From this arc on an oval section can be told from a round one that is off centre."""
-SURE = 2.0
-"""Cells that scatter by less than so much of what their points explain are not wavy."""
+SURE = 4.0
+"""Cells are wavy from so many standard deviations of their scatter's own chance on."""
 N_STEPS = 8
-HALF_OF_SQUARES = 0.4549
-"""Median of the square of a standard normal variable."""
+HALF_OF_SQUARES, VARIANCE_OF_MEDIAN = 0.4549, 5.4
+"""Median of the square of a standard normal variable; variance, times n, of that of n in units
+of it."""
 
 
 def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc: float) -> float:
@@ -71,7 +72,8 @@ def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc:
         left = mean - design @ solution
         # Weights of the least sum of distances, levelled where noise is all there is.
         weight = 1.0 / expected / np.sqrt(np.maximum(np.abs(left), expected))
-    if np.median(np.square(left / expected)) / HALF_OF_SQUARES < SURE**2:
+    scatter = np.median(np.square(left / expected)) / HALF_OF_SQUARES
+    if scatter < 1.0 + SURE * np.sqrt(VARIANCE_OF_MEDIAN / len(left)):
         return 0.0
     excess = np.median(np.square(left)) / HALF_OF_SQUARES - np.median(np.square(expected))
     return float(np.sqrt(max(excess, 0.0)))
