@@ -28,6 +28,8 @@ SIZED = (ElementKind.CYLINDER, ElementKind.TORUS, ElementKind.TEE)
 """Kinds whose radius is a pipe's."""
 MIN_LENGTH = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
+MIN_RUN = 6.0
+"""A straight that nothing follows is a pipe from so many radii on, and a vessel below."""
 LONE, LONG_ENOUGH = 3.0, 0.3
 """What is part of no run is longer than this many radii, or metres: limbs and bodies are not.
 A reducer is always part of one."""
@@ -80,7 +82,7 @@ def build_elements(
     )
     links += [(j.branch, j.run) for j in junctions]
     run = number_runs(len(fitted), links)
-    tees = [j for j in junctions if _is_tee(j, kinds)]
+    tees = [j for j in junctions if _is_tee(j, fitted, kinds, met)]
     return _numbered(
         [
             (part, ElementKind.TEE if part.is_tee else kinds[part.whole], int(run[part.whole]))
@@ -102,13 +104,18 @@ def _kind(found: Fitted) -> ElementKind:
     return ElementKind.SPHERE
 
 
-def _is_tee(junction: Junction, kinds: list[ElementKind]) -> bool:
-    """Whether a branch in the side of a pipe makes it a tee."""
-    pipes = (ElementKind.CYLINDER, ElementKind.TORUS)
+def _is_tee(
+    junction: Junction, fitted: list[Fitted], kinds: list[ElementKind], met: set[tuple[int, int]]
+) -> bool:
+    """Whether a branch in the side of a pipe makes it a tee, and not a vessel with a nozzle."""
+    run = fitted[junction.run]
+    goes_on = (junction.run, 0) in met or (junction.run, 1) in met
+    is_pipe = goes_on or run.axis.length > MIN_RUN * run.fit.model.radius
     return (
         junction.is_wide
+        and is_pipe
         and kinds[junction.run] is ElementKind.CYLINDER
-        and kinds[junction.branch] in pipes
+        and kinds[junction.branch] in (ElementKind.CYLINDER, ElementKind.TORUS)
     )
 
 

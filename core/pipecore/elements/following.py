@@ -28,8 +28,8 @@ MAX_POINTS = 400
 MIN_POINTS = 20
 STARTS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Where the bend may begin, in radii beyond the end: it may have been followed, or be hidden."""
-BEND_RADII: Array = np.asarray(1.3 * 1.14 ** np.arange(16.0), np.float64)
-AZIMUTHS: Array = np.arange(24) * (2 * np.pi / 24)
+BEND_RADII = 1.3 * 1.14 ** np.arange(16.0)
+AZIMUTHS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 MAX_ANGLE = np.deg2rad(100.0)
 MIN_ANGLE, ANGLE_STEP = np.deg2rad(12.0), np.deg2rad(3.0)
 BETTER = 1.3
