@@ -25,7 +25,7 @@ from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.settings import DeformationSettings
 from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind
 
-SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
+SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS, ElementKind.TEE)
 """Kinds whose contour is known well enough to look for deformations."""
 
 STRAIN_SIGNIFICANCE = 5.0

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from pipecore.elements.ahead import refine_in_turn
 from pipecore.elements.bends import Corner, corner_between, find_corners, fit_bend
+from pipecore.elements.corners import is_rounded_corner
 from pipecore.elements.credible import ROUGH, is_credible
 from pipecore.elements.fittings import End, propose_reducers, straight_ends
 from pipecore.elements.flanges import find_flanges
@@ -173,7 +174,9 @@ class _Keeper:
     def _keep_if_it_holds(
         self, found: Fitted | None, between: tuple[End, ...] | None = None
     ) -> None:
-        if found is not None and is_credible(found, self._nearby.surface, self._settings):
+        if found is None or not is_credible(found, self._nearby.surface, self._settings):
+            return
+        if not is_rounded_corner(found, self._nearby):
             self.keep(found, between)
 
     def keep(self, found: Fitted, between: tuple[End, ...] | None = None) -> None:
