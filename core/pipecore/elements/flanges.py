@@ -27,8 +27,9 @@ MAX_OVERHANG = 0.2
 MIN_LENGTH, MAX_LENGTH = 0.008, 0.9
 """Length of a flange, or of a pair with its gasket: metres; radii of the flange."""
 MIN_ARC = np.deg2rad(75.0)
-REACH = 2.0
-"""Flanges are looked for so many radii of the pipe beyond its ends, which may be hidden."""
+REACH, LONGEST = 2.0, 0.06
+"""Flanges are looked for so many radii of the pipe beyond its ends, which may be hidden, and
+so many metres further, for their own length."""
 RADIAL_COS = 0.8
 """Normals at an edge are tilted, but those on the faces of a flange are along the pipe."""
 MAX_MISFIT, MAX_NOISE_MISFIT = 0.012, 0.5
@@ -83,7 +84,7 @@ def _shell(
 ) -> _Shell:
     """Free thinned points wider than the pipe that do not face along it."""
     widest = min(FLANGE_RATIO[1] * radius, radius + MAX_OVERHANG)
-    near = nearby.thinned(axis, widest / OUTER, REACH * radius)
+    near = nearby.thinned(axis, widest / OUTER, REACH * radius + LONGEST)
     near = near[is_free[near]]
     chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[near])
     up, right = axis.frame(chainage)
@@ -211,7 +212,7 @@ def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
                 continue
             chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
             turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
-            reach = (REACH + 1.0) * pipe.fit.model.radius
+            reach = REACH * pipe.fit.model.radius + LONGEST
             near = -reach < chainage[0] < pipe.axis.length + reach
             if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):
                 found.append((i, j))
