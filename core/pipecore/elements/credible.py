@@ -15,9 +15,6 @@ from pipecore.elements.waviness import waviness
 from pipecore.settings import ElementSettings
 from pipecore.surface import Surface
 
-ROUGH = 1.5
-"""Slack for pieces whose last round of fitting is still to come."""
-
 MAX_RADIUS_SD = 0.04
 """Largest standard deviation of a radius, as a share of it."""
 MIN_SPHERE_POINTS = 60

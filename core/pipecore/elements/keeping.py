@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pipecore.elements.ahead import refine_in_turn
 from pipecore.elements.bends import Corner, corner_between, find_corners, fit_bend
 from pipecore.elements.corners import is_rounded_corner
-from pipecore.elements.credible import ROUGH, is_credible
+from pipecore.elements.credible import is_credible
 from pipecore.elements.fittings import End, propose_reducers, straight_ends
 from pipecore.elements.flanges import find_flanges
 from pipecore.elements.following import follow_end
@@ -167,7 +167,7 @@ class _Keeper:
             piece,
             self._nearby,
             usable,
-            lambda rough: is_credible(rough, self._nearby.surface, self._settings, ROUGH),
+            lambda rough, slack: is_credible(rough, self._nearby.surface, self._settings, slack),
             used,
         )
 
