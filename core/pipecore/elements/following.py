@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.bends import SAME_RADIUS
 from pipecore.elements.fittings import NO_ELLIPSES, StraightEnd
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_angles
@@ -34,8 +33,8 @@ MAX_ANGLE = np.deg2rad(100.0)
 MIN_ANGLE, ANGLE_STEP = np.deg2rad(12.0), np.deg2rad(3.0)
 BETTER = 1.3
 """A bend explains so many times as many points as the straight would if it went on."""
-BEYOND = 3.0
-"""A straight is looked for over so many radii beyond a bend."""
+BEYOND, OFF = 3.0, 0.1
+"""A straight is looked for over so many radii beyond a bend, its points so many radii off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +111,17 @@ def follow_end(
         return None
     _, start, bend_radius, azimuth = best
     fine = np.linspace(-1.0, 1.0, 7)
-    _, start, bend_radius, azimuth = max(
-        _best_of(
-            view,
-            start + 0.4 * fine,
-            np.maximum(bend_radius * (1.0 + 0.15 * fine), 1.05),
-            azimuth + np.deg2rad(12.0) * fine,
-            tolerance,
-        ),
-        key=lambda found: found[0],
-    )
+    for share in (1.0, 0.3):
+        _, start, bend_radius, azimuth = max(
+            _best_of(
+                view,
+                start + share * 0.4 * fine,
+                np.maximum(bend_radius * (1.0 + share * 0.15 * fine), 1.05),
+                azimuth + share * np.deg2rad(12.0) * fine,
+                tolerance,
+            ),
+            key=lambda found: found[0],
+        )
     inward = np.cos(azimuth) * frame[1] + np.sin(azimuth) * frame[2]
     begin = origin + start * radius * ahead
     bend = ArcSurface(
@@ -157,7 +157,7 @@ def _straight_beyond(
 ) -> Piece | None:
     """The straight, of those that leave a bend at some angle, that most points are on."""
     radius = bend.radius
-    tolerance = max(3.0 * nearby.surface.noise, SAME_RADIUS * radius)
+    tolerance = max(3.0 * nearby.surface.noise, OFF * radius)
     found = []
     for turn in np.arange(MIN_ANGLE, MAX_ANGLE, ANGLE_STEP):
         direction = np.cos(turn) * ahead + np.sin(turn) * inward
