@@ -1,5 +1,6 @@
 """Compiling the kernels once, in a process beside the window."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -69,3 +70,17 @@ def test_that_the_window_says_what_it_does_at_the_first_run(window):
     assert "once" in status.warming.text()
     status.end_warming()
     assert not status.warming.isVisible()
+
+
+def test_that_the_window_is_there_before_what_only_a_detection_needs():
+    heavy = ("matplotlib", "numba", "open3d", "scipy.spatial", "scipy.ndimage", "laspy")
+    program = (
+        "import sys, pipegui.main_window, pipegui.scene.view, pipegui.plots.section_view\n"
+        "import pipegui.plots.radius_plot, pipegui.plots.deviation_map\n"
+        "import pipegui.plots.preview_view\n"
+        f"print([name for name in {heavy} if name in sys.modules])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120
+    )
+    assert told.stdout.strip() == "[]"
