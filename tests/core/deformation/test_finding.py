@@ -9,7 +9,10 @@ from pipecore.settings import DeformationSettings
 from pipecore.types import DeformationKind
 from tests.core.deformation.sampler import PipeScan, PipeScene, bump, oval
 
-SETTINGS = DeformationSettings()
+SETTINGS = DeformationSettings(significance=6.5)
+"""Above the default, at which one clean scan in some hundred raises an alarm: their rate is
+measured by the study, and these tests scan anew each time."""
+
 PATCHES = (DeformationKind.DENT, DeformationKind.BULGE)
 
 
@@ -29,7 +32,8 @@ def test_that_a_dent_or_bulge_is_measured_within_its_uncertainty(rng, radius, he
     (found,) = find(scan).deformations
     assert found.kind is (DeformationKind.DENT if height < 0 else DeformationKind.BULGE)
     assert abs(found.depth - 0.012) < 5 * found.depth_sd
-    assert found.depth_sd < 0.003
+    # That it may be flat or pointed is part of it: one in some hundred is above 3 mm.
+    assert found.depth_sd < 0.004
     assert found.length == pytest.approx(radius, rel=0.35)
     assert found.width == pytest.approx(radius, rel=0.35)
     assert abs(found.chainage - 0.8) < 0.02
@@ -176,8 +180,8 @@ def test_that_dents_in_bends_and_reducers_are_found(rng, form):
 def test_that_strain_needs_the_wall_thickness(rng):
     scan = dented(-0.015).scan(rng)
     (without,) = find(scan).deformations
-    (thick,) = find(scan, DeformationSettings(wall_thickness_mm=10.0)).deformations
-    (thin,) = find(scan, DeformationSettings(wall_thickness_mm=5.0)).deformations
+    (thick,) = find(scan, replace(SETTINGS, wall_thickness_mm=10.0)).deformations
+    (thin,) = find(scan, replace(SETTINGS, wall_thickness_mm=5.0)).deformations
     assert np.isnan(without.strain)
     assert 0 < thin.strain < thick.strain < 1
 
@@ -263,7 +267,7 @@ def test_that_a_dent_without_strain_says_why(rng):
     scan = dented(-0.015).scan(rng)
     (unset,) = find(scan).deformations
     assert unset.not_measurable == {"strain": "the wall thickness is not set"}
-    (known,) = find(scan, DeformationSettings(wall_thickness_mm=5.0)).deformations
+    (known,) = find(scan, replace(SETTINGS, wall_thickness_mm=5.0)).deformations
     assert known.not_measurable == {}
     shallow = dented(-0.0055, noise=0.003).scan(rng)
     for found in find(
