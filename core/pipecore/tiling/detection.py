@@ -87,6 +87,7 @@ def detect_in_tiles(
                 ellipses, segments = curves.ellipses_of_stacks(
                     engine, tiled, stacks, settings, batch_bytes, progress
                 )
+        _drop_surface(tiled)
         with _timed(seconds, "axes"):
             chains = join_centres(ellipses, progress)
         with _timed(seconds, "elements"):
@@ -96,6 +97,7 @@ def detect_in_tiles(
             )
             built = build_elements(pieces, nearby, settings.elements, progress)
             profiles = tabulate_ellipses(built.elements, ellipses)
+        _drop_surface(tiled)
         with _timed(seconds, "deformations"):
             measured = measure_elements(
                 built,
@@ -135,6 +137,11 @@ def _sizes(settings: Settings, room: int) -> tuple[int, int]:
     if not points:
         return room, room
     return points * thinning.BYTES_PER_POINT, points * curves.BYTES_PER_POINT
+
+
+def _drop_surface(tiled: TiledSurface) -> None:
+    """Give back the memory into which the surface is mapped."""
+    drop_pages(tiled.surface.xyz, tiled.surface.normals, tiled.surface.spacing)
 
 
 def _blank_points(store: Store, n_points: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

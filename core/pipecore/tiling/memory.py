@@ -14,7 +14,7 @@ ONE_PIECE_BYTES = 200
 """A detection in one piece takes at most this much a point: measured, see docs/performance.md."""
 BASE_BYTES = 400 * 2**20
 """The program itself with its libraries and compiled kernels."""
-KEPT_BYTES = 8
+KEPT_BYTES = 16
 """What a point costs whatever the tiles: tables of cells, flags, lists of elements' points."""
 TEXT_BYTES = 25
 """A point takes at least about this much in a file that does not tell how many it holds."""
