@@ -43,14 +43,14 @@ def detect(
 
 
 def compiling_seconds(threads: int) -> float:
-    """How much longer the first detection takes, which compiles the kernels."""
+    """How many CPU seconds more the first detection takes, which compiles the kernels."""
     report = OUT / "report-demo"
     with TemporaryDirectory() as empty:
         first, _ = detect(DEMO, report, threads, NUMBA_CACHE_DIR=empty)
         later, _ = detect(DEMO, report, threads, NUMBA_CACHE_DIR=empty)
     # The usual cache is filled too before anything is measured.
     detect(DEMO, report, threads)
-    return first.wall - later.wall
+    return first.cpu - later.cpu
 
 
 def cloud_of(million: float) -> Path:

@@ -75,7 +75,7 @@ Measured by `{" ".join(["python -m tests.bench", *arguments])}` on {machine()}.
 
 Each line is one whole process, `pipecore detect` on a LAS file with the default settings, from
 its start to the written report. The kernels had been compiled before: the first detection on
-a machine takes {compiling:.0f} s longer. The clouds are simulated plants side by side
+a machine takes {compiling:.0f} CPU seconds longer. The clouds are simulated plants side by side
 (`tests/bench/clouds.py`: six different ones of about 3 million points, then the same turned; 4
 stations, 1 cm spacing, 2 mm noise). laspy beside it only reads the same file's coordinates, in a
 process of its own, before and after; the faster one counts. CPU seconds are of all cores
@@ -140,7 +140,7 @@ def _growth(lines: Sequence[Line]) -> str:
     n_log_n = size * math.log(b.n_points) / math.log(a.n_points)
     return (
         f"From {a.n_points / 1e6:g} to {b.n_points / 1e6:g} million points ({size:.0f} times as "
-        f"many) the CPU seconds grow {cost:.0f} times; N log N grows {n_log_n:.0f} times."
+        f"many) the CPU seconds grow {cost:.1f} times; N log N grows {n_log_n:.1f} times."
     )
 
 
