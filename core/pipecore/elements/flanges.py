@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pipecore.elements.extent import Extent
 from pipecore.elements.nearby import OUTER, NearbyPoints
 from pipecore.elements.refine import Fitted
+from pipecore.elements.runs import Lines
 from pipecore.elements.surfaces import LineSurface, SurfaceFit, robust_sigma
 from pipecore.geometry import LineAxis
 
@@ -201,10 +202,13 @@ def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
         if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered
     ]
     found = []
+    lines = Lines([f.axis for _, f in pipes])
+    reaches = np.array([REACH * f.fit.model.radius + LONGEST for _, f in pipes])
     for i, disc in pipes:
         if disc.axis.length > MAX_LENGTH * disc.fit.model.radius:
             continue
-        for j, pipe in pipes:
+        middle = disc.axis.at(disc.axis.length / 2)
+        for j, pipe in (pipes[k] for k in lines.near(middle, reaches)):
             ratio = disc.fit.model.radius / pipe.fit.model.radius
             if i == j or not FLANGE_RATIO[0] < ratio < FLANGE_RATIO[1]:
                 continue

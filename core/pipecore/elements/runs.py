@@ -1,5 +1,6 @@
 """Runs: elements whose ends meet, with straights and bends trimmed to their tangent points."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,26 @@ class Span:
 
     axis: LineAxis | ArcAxis
     radii: tuple[float, float]
+
+
+class Lines:
+    """Straight axes, to find those near a place among many."""
+
+    def __init__(self, axes: Sequence[LineAxis | ArcAxis]) -> None:
+        self._which = np.array([i for i, a in enumerate(axes) if isinstance(a, LineAxis)], np.intp)
+        lines = [a for a in axes if isinstance(a, LineAxis)]
+        self._start = np.array([a.start for a in lines]).reshape(-1, 3)
+        self._direction = np.array([a.direction for a in lines]).reshape(-1, 3)
+        self._length = np.array([a.length for a in lines])
+
+    def near(self, place: Array, reach: Array) -> list[int]:
+        """Numbers of the axes that pass a place within `reach` (metres, one of each axis)."""
+        q = place - self._start
+        along = np.einsum("ij,ij->i", q, self._direction)
+        rho = np.linalg.norm(q - along[:, None] * self._direction, axis=1)
+        r = reach[self._which]
+        there = (rho < r) & (along > -r) & (along < self._length + r)
+        return [int(i) for i in self._which[there]]
 
 
 def meeting_ends(spans: list[Span]) -> list[tuple[int, int, int, int]]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipecore.elements.extent import Extent
 from pipecore.elements.refine import Fitted
-from pipecore.elements.runs import Span
+from pipecore.elements.runs import Lines, Span
 from pipecore.geometry import ArcAxis, LineAxis
 
 BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
@@ -55,12 +55,15 @@ def find_junctions(spans: list[Span], met: set[tuple[int, int]]) -> list[Junctio
         Ends (element, 0 for its start or 1 for its end) that another element follows.
     """
     found = []
+    lines = Lines([span.axis for span in spans])
+    radii = np.array([max(span.radii) for span in spans])
     for i, branch in enumerate(spans):
         for end in (0, 1):
             point = branch.axis.end if end else branch.axis.start
             tangent = branch.axis.tangent(branch.axis.length if end else 0.0)
             outward = tangent if end else -tangent
-            for j, run in enumerate(spans):
+            for j in lines.near(point, ENDS_WITHIN[1] * radii + MAX_GAP * branch.radii[end]):
+                run = spans[j]
                 if i == j or not isinstance(run.axis, LineAxis):
                     continue
                 radius = max(run.radii)

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore.elements.extent import find_extent, section_misfit, turning_by_row
-from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
+from pipecore.elements.runs import Lines, Span, meeting_ends, number_runs, trim_to_tangent
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
 
@@ -221,3 +221,21 @@ def test_that_nothing_is_trimmed_where_the_tangent_point_is_out_of_reach(rng):
     line, arc = trim_to_tangent(longer, 1, bend, 0, 0.2)
     assert line is longer
     assert arc is bend
+
+
+def test_that_lines_near_a_place_are_those_that_pass_it(rng):
+    axes = [LineAxis(rng.uniform(-1, 1, 3), random_direction(rng), 0.8) for _ in range(40)]
+    axes[7] = ArcAxis(np.zeros(3), np.eye(3)[2], np.eye(3)[0], 0.3, 1.0)
+    lines, reach = Lines(axes), rng.uniform(0.1, 0.6, 40)
+    n_found = 0
+    for place in rng.uniform(-1, 1, (20, 3)):
+        expected = []
+        for i, axis in enumerate(axes):
+            (s,), (rho,), _ = axis.pipe_coordinates(place[None])
+            beside = -reach[i] < s < axis.length + reach[i]
+            if isinstance(axis, LineAxis) and rho < reach[i] and beside:
+                expected.append(i)
+        assert lines.near(place, reach) == expected
+        n_found += len(expected)
+    assert n_found > 20
+    assert Lines([]).near(np.zeros(3), np.empty(0)) == []
