@@ -25,7 +25,7 @@ MOVING_SECONDS = 0.06
 """For the points of a frame while the camera moves: the rest of 0.1 s is for all else."""
 FRAME_SECONDS = 0.02
 """What a frame costs without points, about."""
-MOST_WITHOUT_CARD = 6_000_000
+MOST_WITHOUT_CARD = 5_000_000
 """At most so many points at rest where memory has to stand in for a graphics card: each takes
 over 100 bytes there, and a large window has fewer pixels."""
 MIN_POINT_PX, MAX_POINT_PX = 1.0, 5.0
