@@ -87,17 +87,13 @@ def test_that_a_flange_on_a_pipe_or_at_its_end_is_found_by_its_rim(
     assert flanges([straight(pipe, radius), ring]) == [(1, 0)]
 
 
-def test_that_a_wider_pipe_a_wall_and_a_block_around_a_pipe_are_no_flanges(rng, frame):
+def test_that_a_wider_pipe_and_a_wall_beside_a_pipe_are_no_flanges(rng, frame):
     origin, (along, across, up) = frame
     pipe, radius = LineAxis(origin, along, 1.0), 0.06
     own = part_of_pipe(rng, pipe, radius)
     sleeve = part_of_pipe(rng, LineAxis(pipe.at(0.3), along, 0.4), 0.1)
     wall = plane(rng, origin + 0.09 * across - 0.3 * up, along, 0.6 * up, SPACING, NOISE)
-    block = [
-        plane(rng, pipe.at(0.4) + 0.08 * a - 0.08 * b, 0.05 * along, 0.16 * b, SPACING, NOISE)
-        for a, b in ((across, up), (up, across), (-across, up))
-    ]
-    for other in ([sleeve], [wall], block):
+    for other in ([sleeve], [wall]):
         assert rings_of(straight(pipe, radius), own, *other) == []
 
 
