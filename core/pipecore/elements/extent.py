@@ -23,6 +23,8 @@ SHARE_OF_ARC = 0.45
 OVAL_ARC = float(np.deg2rad(200.0))
 MAX_OVAL = 0.05
 """From this arc on an oval section can be told, up to this amplitude in radii."""
+OVAL_SHARE = 0.6
+"""An oval section leaves at most this share of what a round one does: a bow leaves more."""
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
@@ -116,7 +118,8 @@ def find_extent(
     if np.any((off >= max_off) & (arc > OVAL_ARC)):
         # An oval stretch of a pipe is off the circle, and still the pipe.
         oval = _oval_by_row(clock, residual, row, n_rows, radius)
-        off = np.minimum(off, _median_by_row(np.abs(residual - oval), row, n_rows))
+        of_oval = _median_by_row(np.abs(residual - oval), row, n_rows)
+        off = np.where(of_oval < OVAL_SHARE * off, of_oval, off)
     is_covered = (
         (arc >= max(SHARE_OF_ARC * usual_arc, min(MIN_COVERED_ARC, 0.8 * usual_arc)))
         & (off < max_off)

@@ -65,7 +65,9 @@ def test_that_detect_writes_a_report_and_says_what_was_found(
 
 def test_that_away_from_a_terminal_each_stage_is_one_line(scan_file, detections, tmp_path, capsys):
     assert run("detect", scan_file, "-o", tmp_path / "report") == 0
-    stages = [line.split("  ")[0] for line in capsys.readouterr().err.splitlines()]
+    lines = capsys.readouterr().err.splitlines()
+    # Whether the kernels have still to be compiled depends on what ran before.
+    stages = [line.split("  ")[0] for line in lines if "compiles its kernels" not in line]
     assert len(stages) == len(set(stages))
     assert stages[:3] == ["Reading", "Profiles", "Ellipses"]
     assert "\r" not in "".join(stages)
