@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui study bench pictures format lock venv system-packages clean
+.PHONY: help demo test lint test-core test-kernels test-gui study bench pictures texts format lock venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -50,6 +50,9 @@ bench: venv ## Measure time and memory (writes docs/performance.md)
 
 pictures: venv ## Take the pictures of README and guide anew
 	$(WINDOWED) $(PYTHON) -m tests.pictures
+
+texts: venv ## Bring the translations up to the sources, and compile them
+	$(PYTHON) -m tests.catalogue
 
 format: venv ## Lay out the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix

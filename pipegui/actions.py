@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QMainWindow, QMenu
 from pipegui import theme
 from pipegui.command_search import Entry
 from pipegui.document import Background
+from pipegui.texts import LANGUAGES, plain_title, tr
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,11 @@ def _appearance(appearance: theme.Appearance) -> ActionSpec:
     name = f"appearance_{appearance.name.lower()}"
     tip = "Colours of the window"
     return ActionSpec(name, str(appearance), tip, is_checkable=True, submenu="Appearance")
+
+
+def _language(code: str) -> ActionSpec:
+    name, tip = f"language_{code or 'system'}", "What the window speaks"
+    return ActionSpec(name, LANGUAGES[code], tip, is_checkable=True, submenu="Language")
 
 
 MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
@@ -193,6 +199,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         ),
         *(_background(b) for b in Background),
         *(_appearance(a) for a in theme.Appearance),
+        *(_language(code) for code in LANGUAGES),
         _SEPARATOR,
         _A("next_panel", "Next panel", "Give the keyboard to the next panel", "", "F6"),
         _A("previous_panel", "Previous panel", "Back to the panel before", "", "Shift+F6"),
@@ -319,7 +326,7 @@ class Actions:
         self.menus: dict[str, QMenu] = {}
         self._actions: dict[str, QAction] = {}
         for name, specs in MENUS.items():
-            menu = self.menus[name] = window.menuBar().addMenu(f"&{name}")
+            menu = self.menus[name] = window.menuBar().addMenu(_with_key(tr(name)))
             for spec in specs:
                 if spec is None:
                     menu.addSeparator()
@@ -336,7 +343,7 @@ class Actions:
 
     def _submenu(self, menu: QMenu, title: str) -> QMenu:
         if title not in self.menus:
-            self.menus[title] = menu.addMenu(title)
+            self.menus[title] = menu.addMenu(tr(title))
         return self.menus[title]
 
     def __getitem__(self, name: str) -> QAction:
@@ -345,7 +352,7 @@ class Actions:
     def entries(self) -> list[Entry]:
         """All actions with the names of their menus."""
         return [
-            Entry(self._actions[spec.name], menu)
+            Entry(self._actions[spec.name], plain_title(tr(menu)))
             for menu, specs in MENUS.items()
             for spec in specs
             if spec is not None
@@ -372,12 +379,18 @@ class Actions:
         action.blockSignals(False)
 
 
+def _with_key(title: str) -> str:
+    """A menu's title with the mark of its key: the first letter, if the translation has none."""
+    return title if "&" in title else f"&{title}"
+
+
 def _make(spec: ActionSpec, window: QMainWindow) -> QAction:
-    action = QAction(spec.text, window)
+    tip = tr(spec.tip)
+    action = QAction(tr(spec.text), window)
     action.setObjectName(spec.name)
     action.setCheckable(spec.is_checkable)
     action.setShortcut(QKeySequence(spec.shortcut))
     shortcut = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
-    action.setToolTip(f"{spec.tip} ({shortcut})" if shortcut else spec.tip)
-    action.setStatusTip(spec.tip)
+    action.setToolTip(f"{tip} ({shortcut})" if shortcut else tip)
+    action.setStatusTip(tip)
     return action

@@ -6,8 +6,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 import pipecore
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,12 +35,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     app.setOrganizationName("PipeGUI")
     app.setApplicationVersion(pipecore.__version__)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-    theme.apply_theme(app)
     with TemporaryDirectory() as scratch:
         # A picture is the same on every machine: no layout of an earlier session.
         is_shot = options.screenshot is not None
         ini = QSettings.Format.IniFormat
         stored = QSettings(f"{scratch}/layout.ini", ini) if is_shot else QSettings()
+        _speak(app, "en" if is_shot else str(stored.value("language", "")))
+        theme.apply_theme(app)
         window = MainWindow(make_parts(), Jobs(), stored, None if is_shot else _rescue_folder())
         guard = CrashGuard(window)
         guard.happened.connect(window.tell_crash)
@@ -63,6 +68,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
         window.close()
         window.deleteLater()
         return code
+
+
+def _speak(app: "QApplication", chosen: str) -> None:
+    """Choose the language of all texts, Qt's own too; numbers keep the decimal point."""
+    from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator  # noqa: PLC0415
+
+    from pipegui import texts  # noqa: PLC0415
+
+    texts.use_language(chosen, QLocale.system().uiLanguages()[0])
+    QLocale.setDefault(QLocale.c())
+    if texts.language() != "en":
+        translator = QTranslator(app)
+        folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
+        if translator.load(f"qtbase_{texts.language()}", folder):
+            app.installTranslator(translator)
 
 
 def _rescue_folder() -> Path:

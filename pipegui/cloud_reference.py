@@ -9,6 +9,7 @@ from pathlib import Path
 from pipecore.errors import WriteError
 from pipecore.settings import LengthUnit
 from pipegui.document import Scan
+from pipegui.texts import tr
 
 N_SAMPLES, SAMPLE_BYTES = 32, 65_536
 """A fingerprint takes this many samples of a file."""
@@ -65,12 +66,18 @@ class CloudReference:
         """Refer to the cloud of a scan from a project's folder; `WriteError` if it has no file."""
         source = scan.cloud.source
         if source is None:
-            raise WriteError(f"“{scan.name}” was not read from a file, so it cannot be saved.")
+            raise WriteError(
+                tr("“{name}” was not read from a file, so it cannot be saved.").format(
+                    name=scan.name
+                )
+            )
         source = Path(os.path.abspath(source))  # noqa: PTH100 - links stay links
         try:
             fingerprint = Fingerprint.of(source)
         except OSError as error:
-            raise WriteError(f"The scan “{source}” is no longer there.") from error
+            raise WriteError(
+                tr("The scan “{source}” is no longer there.").format(source=source)
+            ) from error
         try:
             relative = os.path.relpath(source, folder).replace(os.sep, "/")
         except ValueError:  # on another drive

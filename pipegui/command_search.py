@@ -7,6 +7,7 @@ from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtGui import QAction, QKeyEvent
 from PySide6.QtWidgets import QFrame, QLineEdit, QTreeWidget, QTreeWidgetItem, QVBoxLayout, QWidget
 
+from pipegui.texts import tr
 from pipegui.theme import SPACING
 
 WIDTH, ROWS = 60 * SPACING, 10
@@ -81,11 +82,11 @@ class CommandSearch(QFrame):
         self.setFrameShape(QFrame.Shape.StyledPanel)
         self._entries = entries
         self.field = QLineEdit()
-        self.field.setPlaceholderText("Search actions")
-        self.field.setAccessibleName("Search actions")
+        self.field.setPlaceholderText(tr("Search actions"))
+        self.field.setAccessibleName(tr("Search actions"))
         self.field.setClearButtonEnabled(True)
         self.list = QTreeWidget()
-        self.list.setAccessibleName("Actions found")
+        self.list.setAccessibleName(tr("Actions found"))
         self.list.setHeaderHidden(True)
         self.list.setRootIsDecorated(False)
         self.list.setColumnCount(3)
@@ -127,7 +128,7 @@ class CommandSearch(QFrame):
             item.setDisabled(not action.isEnabled())
             self.list.addTopLevelItem(item)
         if not ranked:
-            item = QTreeWidgetItem(["No action is called that", "", ""])
+            item = QTreeWidgetItem([tr("No action is called that"), "", ""])
             item.setDisabled(True)
             self.list.addTopLevelItem(item)
         self.list.setCurrentItem(self.list.topLevelItem(0))

@@ -23,6 +23,7 @@ from pipegui.document import (
     Tool,
     ViewOptions,
 )
+from pipegui.texts import mark
 
 Command = TypeVar("Command", bound=Callable[..., Document])
 
@@ -45,23 +46,23 @@ def step(undo_text: str | Callable[..., str]) -> Callable[[Command], Command]:
     A function is given what the command is, before it is carried out.
     """
 
-    def mark(command: Command) -> Command:
+    def marked(command: Command) -> Command:
         command.undo_text = undo_text  # type: ignore[attr-defined]
         return command
 
-    return mark
+    return marked
 
 
 # Scans and results
 
 
-@step("Open")
+@step(mark("Open"))
 def open_scan(document: Document, scan: Scan) -> Document:
     """Add a scan and look at it."""
     return activate_scan(replace(document, scans=(*document.scans, scan)), len(document.scans))
 
 
-@step("Close")
+@step(mark("Close"))
 def close_scan(document: Document, index: int) -> Document:
     """Remove a scan; the one before it is looked at."""
     scans = document.scans[:index] + document.scans[index + 1 :]
@@ -92,7 +93,7 @@ def step_scan(document: Document) -> Document:
     return activate_scan(document, (document.active + 1) % max(len(document.scans), 1))
 
 
-@step("Detect")
+@step(mark("Detect"))
 def set_result(document: Document, cloud: PointCloud, result: Result) -> Document:
     """Take the result of a detection on `cloud`; keeps the selection, else shows the worst dent.
 
@@ -123,13 +124,13 @@ def set_result(document: Document, cloud: PointCloud, result: Result) -> Documen
 # Reviewing
 
 
-@step("Review")
+@step(mark("Review"))
 def set_review(document: Document, deformation_ids: Iterable[int], state: ReviewState) -> Document:
     """Accept deformations, reject them, or leave them open again."""
     return _reviewed(document, {i: {"state": state} for i in deformation_ids})
 
 
-@step("Comment")
+@step(mark("Comment"))
 def set_comment(document: Document, deformation_id: int, comment: str) -> Document:
     """Say something about a deformation."""
     return _reviewed(document, {deformation_id: {"comment": comment.strip()}})
@@ -252,52 +253,52 @@ def step_deformation(document: Document, by: int) -> Document:
 # Settings and stacks
 
 
-@step("Change settings")
+@step(mark("Change settings"))
 def change_settings(document: Document, changes: Mapping[str, Any]) -> Document:
     """Change settings by dotted key; raises `SettingsError` if a value does not fit."""
     return replace(document, settings=document.settings.replace(changes))
 
 
-@step("Reset settings")
+@step(mark("Reset settings"))
 def reset_settings(document: Document) -> Document:
     """Back to the defaults, own stacks excepted."""
     stacks = {"stacks.directions": document.settings.stacks.directions}
     return replace(document, settings=Settings().replace(stacks))
 
 
-@step("Reset settings")
+@step(mark("Reset settings"))
 def reset_keys(document: Document, keys: Iterable[str]) -> Document:
     """Set some settings back to their defaults, by dotted key."""
     defaults = Settings()
     return change_settings(document, {key: defaults.get(key) for key in keys})
 
 
-@step("Preset")
+@step(mark("Preset"))
 def apply_preset(document: Document, settings: Settings) -> Document:
     """Take the settings of a preset; what belongs to the scan stays."""
     return replace(document, settings=presets.applied(document.settings, settings))
 
 
-@step("Load settings")
+@step(mark("Load settings"))
 def load_settings(document: Document, settings: Settings) -> Document:
     """Take settings from elsewhere."""
     return replace(document, settings=settings)
 
 
-@step("Change directions")
+@step(mark("Change directions"))
 def set_preset(document: Document, preset: DirectionPreset) -> Document:
     """Choose which stacks are cut besides the user's own."""
     return change_settings(document, {"stacks.preset": preset})
 
 
-@step("Add stack")
+@step(mark("Add stack"))
 def add_stack(document: Document, direction: tuple[float, ...]) -> Document:
     """Add an own stack: (x, y, z) or (x, y, z, width in mm)."""
     directions = (*document.settings.stacks.directions, direction)
     return change_settings(document, {"stacks.directions": directions})
 
 
-@step("Edit stack")
+@step(mark("Edit stack"))
 def edit_stack(document: Document, index: int, direction: tuple[float, ...]) -> Document:
     """Change an own stack."""
     directions = list(document.settings.stacks.directions)
@@ -305,7 +306,7 @@ def edit_stack(document: Document, index: int, direction: tuple[float, ...]) -> 
     return change_settings(document, {"stacks.directions": tuple(directions)})
 
 
-@step("Remove stack")
+@step(mark("Remove stack"))
 def remove_stack(document: Document, index: int) -> Document:
     """Remove an own stack."""
     directions = document.settings.stacks.directions
@@ -357,14 +358,14 @@ def toggle_pin(document: Document) -> Document:
     return set_view(document, pinned_elements=pinned)
 
 
-@step("Show or hide")
+@step(mark("Show or hide"))
 def set_hidden(document: Document, element_ids: Iterable[int], hidden: bool) -> Document:
     """Hide elements, or show them again."""
     before, ids = document.view.hidden_elements, frozenset(element_ids)
     return set_view(document, hidden_elements=before | ids if hidden else before - ids)
 
 
-@step("Isolate")
+@step(mark("Isolate"))
 def isolate(document: Document) -> Document:
     """Hide all elements but those of the selection."""
     result, selection = document.result, document.selection
@@ -375,7 +376,7 @@ def isolate(document: Document) -> Document:
     return set_view(document, hidden_elements=hidden)
 
 
-@step("Show all")
+@step(mark("Show all"))
 def show_all(document: Document) -> Document:
     """Show all hidden elements again."""
     return set_view(document, hidden_elements=frozenset())

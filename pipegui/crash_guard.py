@@ -9,6 +9,7 @@ from types import TracebackType
 from PySide6.QtCore import QObject, Signal, qVersion
 
 import pipecore
+from pipegui.texts import tr
 
 
 class CrashGuard(QObject):
@@ -47,10 +48,10 @@ class CrashGuard(QObject):
     def _tell(
         self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
     ) -> None:
-        message = (
-            f"Something went wrong inside the program ({kind.__name__}). Your work is still here; "
-            "save it, and send the details to the developers."
-        )
+        message = tr(
+            "Something went wrong inside the program ({kind}). Your work is still "
+            "here; save it, and send the details to the developers."
+        ).format(kind=kind.__name__)
         lines = traceback.format_exception(kind, error, trace)
         self.happened.emit(message, f"{describe_system()}\n\n{''.join(lines)}")
 

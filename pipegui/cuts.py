@@ -22,6 +22,7 @@ from pipecore.types import (
     Result,
 )
 from pipegui.document import ProfileKey
+from pipegui.texts import tr
 
 
 @lru_cache(maxsize=8)
@@ -102,7 +103,7 @@ def dent_limit(result: Result, element_id: int) -> DentLimit | None:
         Measure.DEPTH_PCT_LENGTH: element.axis.length / 100,
     }
     limits = [
-        DentLimit(criterion.limit * in_metres[criterion.measure], f"{rule.title}\n{criterion}")
+        DentLimit(criterion.limit * in_metres[criterion.measure], f"{tr(rule.title)}\n{criterion}")
         for criterion in rule.criteria
         if criterion.measure in in_metres and criterion.covers(DeformationKind.DENT, element)
     ]
@@ -112,9 +113,13 @@ def dent_limit(result: Result, element_id: int) -> DentLimit | None:
 def stack_name(result: Result, stack_id: int) -> str:
     """What people call a stack."""
     if stack_id == OWN_STACK:
-        return "Across the axis"
+        return tr("Across the axis")
     stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
-    return stack.name if stack is not None and stack.name else f"Stack {stack_id}"
+    return (
+        stack.name
+        if stack is not None and stack.name
+        else tr("Stack {stack_id}").format(stack_id=stack_id)
+    )
 
 
 @lru_cache(maxsize=4)

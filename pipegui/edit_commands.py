@@ -10,14 +10,19 @@ from pipecore.types import NO_ID, NominalSize, PointCloud, Result
 from pipegui import selecting
 from pipegui.commands import step
 from pipegui.document import Document, Scan
+from pipegui.texts import label_of, mark, tr
 
 
 def _names(document: Document, element_ids: Iterable[int]) -> str:
-    labels = {e.element_id: e.label for e in document.result.elements} if document.result else {}
-    return ", ".join(labels.get(i, f"element {i}") for i in sorted(element_ids))
+    labels = (
+        {e.element_id: label_of(e) for e in document.result.elements} if document.result else {}
+    )
+    return ", ".join(labels.get(i, tr("element {i}").format(i=i)) for i in sorted(element_ids))
 
 
-@step(lambda document, element_ids: f"Delete {_names(document, element_ids)}")
+@step(
+    lambda document, element_ids: tr("Delete {names}").format(names=_names(document, element_ids))
+)
 def delete_elements(document: Document, element_ids: Collection[int]) -> Document:
     """Take elements away, with their deformations."""
     from pipecore.editing import delete_elements as deleted  # noqa: PLC0415 - loads numba
@@ -27,17 +32,25 @@ def delete_elements(document: Document, element_ids: Collection[int]) -> Documen
     return _with_result(document, document.active, deleted(document.result, element_ids))
 
 
-@step(lambda document, element_id, name: f"Rename {_names(document, [element_id])}")
+@step(
+    lambda document, element_id, name: tr("Rename {names}").format(
+        names=_names(document, [element_id])
+    )
+)
 def rename_element(document: Document, element_id: int, name: str) -> Document:
     """Call an element by a name; "" goes back to its kind and number."""
     from pipecore.editing import name_element  # noqa: PLC0415 - loads numba
 
-    if document.result is None or document.result.element(element_id).label == name.strip():
+    if document.result is None or label_of(document.result.element(element_id)) == name.strip():
         return document
     return _with_result(document, document.active, name_element(document.result, element_id, name))
 
 
-@step(lambda document, element_id, size: f"Change size of {_names(document, [element_id])}")
+@step(
+    lambda document, element_id, size: tr("Change size of {names}").format(
+        names=_names(document, [element_id])
+    )
+)
 def set_nominal_size(document: Document, element_id: int, size: NominalSize | None) -> Document:
     """Say which catalogue size an element has."""
     from pipecore.editing import set_nominal_size as sized  # noqa: PLC0415 - loads numba
@@ -47,7 +60,7 @@ def set_nominal_size(document: Document, element_id: int, size: NominalSize | No
     return _with_result(document, document.active, sized(document.result, element_id, size))
 
 
-@step("Rename scan")
+@step(mark("Rename scan"))
 def rename_scan(document: Document, index: int, name: str) -> Document:
     """Call a scan by another name; its file keeps its own."""
     name = " ".join(name.split())

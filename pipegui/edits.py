@@ -10,12 +10,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QInputDialog, QMenu
 
 from pipecore.catalogues import sizes_of
-from pipecore.report.format import format_measure
 from pipecore.types import ElementKind, PointCloud, Result, ReviewState
 from pipegui import commands, edit_commands, selecting
 from pipegui.document import Document, Scan
 from pipegui.jobs import Edited
 from pipegui.panels.project_tree import NodeKind
+from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.worker import JobProgress
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
 }
 """Actions by the kind of row; "" separates."""
 
-NO_SIZE = "No nominal size"
+NO_SIZE = mark("No nominal size")
 Reshape = Callable[[PointCloud, Result, JobProgress], Result]
 
 
@@ -116,13 +116,15 @@ class Edits:
         _, result, [element_id] = self._targets()
         element = result.element(element_id)
         sizes = sizes_of(str(result.settings.elements.catalogue))
-        names = [NO_SIZE, *(f"{s.name} · OD {1000 * s.outside_diameter:.1f} mm" for s in sizes)]
+        names = [tr(NO_SIZE), *(f"{s.name} · OD {1000 * s.outside_diameter:.1f} mm" for s in sizes)]
         nearest = min(sizes, key=lambda s: abs(s.outside_diameter - 2 * element.radius))
         here = 1 + sizes.index(element.nominal if element.nominal in sizes else nearest)
         measured = format_measure(2000 * element.radius, 2000 * element.radius_sd, "mm")
         self._choose(
-            "Nominal size",
-            f"{element.label} measures OD {measured}. It is:",
+            tr("Nominal size"),
+            tr("{label} measures OD {measured}. It is:").format(
+                label=label_of(element), measured=measured
+            ),
             names,
             here,
             lambda i: window.do(
@@ -143,8 +145,12 @@ class Edits:
         from pipecore.editing import merge_elements  # noqa: PLC0415 - loads numba
 
         _, result, ids = self._targets()
-        names = " and ".join(result.element(i).label for i in ids)
-        self._reshape("Merging", f"Merge {names}", lambda c, r, p: merge_elements(c, r, ids, p))
+        names = tr(" and ").join(label_of(result.element(i)) for i in ids)
+        self._reshape(
+            tr("Merging"),
+            tr("Merge {names}").format(names=names),
+            lambda c, r, p: merge_elements(c, r, ids, p),
+        )
 
     def split(self) -> None:
         """Ask where to split the selected element."""
@@ -153,9 +159,13 @@ class Edits:
         element = result.element(element_id)
         length = element.axis.length
         dialog = QInputDialog(window)
-        dialog.setWindowTitle("Split element")
+        dialog.setWindowTitle(tr("Split element"))
         dialog.setInputMode(QInputDialog.InputMode.DoubleInput)
-        dialog.setLabelText(f"Split {element.label} ({length:.3f} m long) at chainage, m:")
+        dialog.setLabelText(
+            tr("Split {label} ({length:.3f} m long) at chainage, m:").format(
+                label=label_of(element), length=length
+            )
+        )
         dialog.setDoubleRange(0.0, length)
         dialog.setDoubleDecimals(3)
         dialog.setDoubleStep(0.01)
@@ -177,8 +187,8 @@ class Edits:
         from pipecore.editing import split_element  # noqa: PLC0415 - loads numba
 
         self._reshape(
-            "Splitting",
-            f"Split {self._label(element_id)}",
+            tr("Splitting"),
+            tr("Split {label}").format(label=self._label(element_id)),
             lambda c, r, p: split_element(c, r, element_id, chainage, p),
         )
 
@@ -190,9 +200,9 @@ class Edits:
         element = result.element(element_id)
         kinds = kinds_of(element)
         self._choose(
-            "Kind of element",
-            f"{element.label} is a:",
-            [str(kind) for kind in kinds],
+            tr("Kind of element"),
+            tr("{label} is a:").format(label=label_of(element)),
+            [tr(kind) for kind in kinds],
             kinds.index(element.kind) if element.kind in kinds else 0,
             lambda i: self._change_kind(element_id, kinds[i]),
         )
@@ -203,8 +213,8 @@ class Edits:
         _, result, _ = self._targets()
         if result.element(element_id).kind is not kind:
             self._reshape(
-                "Measuring",
-                f"Change {self._label(element_id)} to {kind}",
+                tr("Measuring"),
+                tr("Change {label} to {kind}").format(label=self._label(element_id), kind=kind),
                 lambda c, r, p: change_kind(c, r, element_id, kind, p),
             )
 
@@ -214,7 +224,9 @@ class Edits:
         from pipecore.pipeline import STAGES  # noqa: PLC0415
 
         _, result, ids = self._targets()
-        names = ", ".join(result.element(i).label for i in ids[:3]) + ("…" if len(ids) > 3 else "")
+        names = ", ".join(label_of(result.element(i)) for i in ids[:3]) + (
+            "…" if len(ids) > 3 else ""
+        )
         settings = self._window.document.settings
 
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
@@ -222,7 +234,12 @@ class Edits:
             index = editing.points_around(cloud, result, ids)
             return editing.detect_again(cloud, result, index, settings, progress, ids)
 
-        self._reshape("Detecting again", f"Detect again around {names}", change, expected=False)
+        self._reshape(
+            tr("Detecting again"),
+            tr("Detect again around {names}").format(names=names),
+            change,
+            expected=False,
+        )
 
     def detect_in_box(self) -> None:
         """Detect again in the clipping box, with the present settings."""
@@ -237,20 +254,28 @@ class Edits:
             index = editing.points_in_box(cloud, box.low, box.high)
             return editing.detect_again(cloud, result, index, settings, progress)
 
-        self._reshape("Detecting in the box", "Detect again in the box", change, expected=False)
+        self._reshape(
+            tr("Detecting in the box"), tr("Detect again in the box"), change, expected=False
+        )
 
     def take(self, edited: Edited) -> None:
         """Take what was worked out, unless the result has been changed meanwhile."""
         window = self._window
         if edit_commands.place_of(window.document, edited.cloud, edited.before) is None:
             window.panels.message.tell(
-                f"“{edited.text}” was dropped: the elements were changed meanwhile. Do it again.",
+                tr(
+                    "“{text}” was dropped: the elements were changed meanwhile. Do it again."
+                ).format(text=edited.text),
                 "warning",
             )
             return
         before, after = edited.before, edited.after
         window.do(edit_commands.take_edit, edited.cloud, before, after, edited.text)
-        window.panels.message.tell(f"{edited.text}: done. {_difference(before, after)}".strip())
+        window.panels.message.tell(
+            tr("{text}: done. {difference}")
+            .format(text=edited.text, difference=_difference(before, after))
+            .strip()
+        )
 
     def _reshape(self, title: str, text: str, change: Reshape, *, expected: bool = True) -> None:
         scan, result, _ = self._targets()
@@ -269,7 +294,7 @@ class Edits:
 
     def _label(self, element_id: int) -> str:
         _, result, _ = self._targets()
-        return result.element(element_id).label
+        return label_of(result.element(element_id))
 
     def _choose(
         self, title: str, label: str, names: list[str], here: int, take: Callable[[int], object]
@@ -295,7 +320,7 @@ def _difference(before: Result, after: Result) -> str:
     if not 1 <= len(new) <= 3:
         return ""
     return "; ".join(
-        f"{e.label}: r {format_measure(1000 * e.radius, 1000 * e.radius_sd, 'mm')}, "
+        f"{label_of(e)}: r {format_measure(1000 * e.radius, 1000 * e.radius_sd, 'mm')}, "
         f"{e.axis.length:.2f} m"
         for e in new
     )

@@ -7,6 +7,7 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from pipecore.io import file_filter
 from pipegui.project_file import SUFFIX
+from pipegui.texts import tr
 
 N_RECENT = 10
 
@@ -15,9 +16,9 @@ def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
     """Ask for scans to open."""
     names, _ = QFileDialog.getOpenFileNames(
         parent,
-        "Open laser scans",
+        tr("Open laser scans"),
         _last_folder(settings),
-        f"{file_filter()};;Projects (*{SUFFIX})",
+        _scans_filter() + ";;" + tr("Projects (*{suffix})").format(suffix=SUFFIX),
     )
     paths = [Path(name) for name in names]
     if paths:
@@ -28,7 +29,7 @@ def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
 def ask_scan(parent: QWidget, settings: QSettings, name: str) -> Path | None:
     """Ask where a scan is."""
     found, _ = QFileDialog.getOpenFileName(
-        parent, f"Locate “{name}”", _last_folder(settings), file_filter()
+        parent, tr("Locate “{name}”").format(name=name), _last_folder(settings), _scans_filter()
     )
     return Path(found) if found else None
 
@@ -36,7 +37,10 @@ def ask_scan(parent: QWidget, settings: QSettings, name: str) -> Path | None:
 def ask_project(parent: QWidget, settings: QSettings) -> Path | None:
     """Ask for a project to open."""
     name, _ = QFileDialog.getOpenFileName(
-        parent, "Open project", _last_folder(settings), f"Projects (*{SUFFIX})"
+        parent,
+        tr("Open project"),
+        _last_folder(settings),
+        tr("Projects (*{suffix})").format(suffix=SUFFIX),
     )
     if not name:
         return None
@@ -47,7 +51,7 @@ def ask_project(parent: QWidget, settings: QSettings) -> Path | None:
 def ask_settings(parent: QWidget, settings: QSettings) -> Path | None:
     """Ask for a settings file to load."""
     name, _ = QFileDialog.getOpenFileName(
-        parent, "Load settings", _last_folder(settings), "Settings (*.toml)"
+        parent, tr("Load settings"), _last_folder(settings), tr("Settings (*.toml)")
     )
     return Path(name) if name else None
 
@@ -68,7 +72,7 @@ def ask_target(
 def ask_report_folder(parent: QWidget, settings: QSettings, name: str) -> Path | None:
     """Ask for the folder in which a report's own folder `name` is made."""
     chosen = QFileDialog.getExistingDirectory(
-        parent, "Make the report folder in", _last_folder(settings)
+        parent, tr("Make the report folder in"), _last_folder(settings)
     )
     if not chosen:
         return None
@@ -110,3 +114,9 @@ def preset_folder() -> Path:
 def _last_folder(settings: QSettings) -> str:
     folder = settings.value("files/folder", "")
     return str(folder) if folder and Path(str(folder)).is_dir() else str(Path.home())
+
+
+def _scans_filter() -> str:
+    """The core's filter of kinds of files; what is no name of a format is translated."""
+    kinds = [kind.partition(" (") for kind in file_filter().split(";;")]
+    return ";;".join(f"{tr(name)}{opening}{endings}" for name, opening, endings in kinds)

@@ -16,6 +16,7 @@ from pipecore.errors import ReadError
 from pipecore.settings import Settings
 from pipecore.types import PointCloud, Result
 from pipegui.document import Scan
+from pipegui.texts import tr
 from pipegui.worker import (
     Cancelled,
     Event,
@@ -152,10 +153,10 @@ class Jobs(QObject):
             def work(progress: JobProgress, path: Path = path) -> Scan:
                 cloud = self.read(path, settings, progress)
                 if not len(cloud):
-                    raise ReadError(f"“{path.name}” holds no points.")
+                    raise ReadError(tr("“{name}” holds no points.").format(name=path.name))
                 return Scan(path.name, cloud, length_unit=settings.input.length_unit)
 
-            title = f"Reading {path.name}"
+            title = tr("Reading {name}").format(name=path.name)
             lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))
 
     def _side_lane(self) -> "Jobs":
@@ -175,7 +176,7 @@ class Jobs(QObject):
         def work(progress: JobProgress) -> Result:
             return self._detect(cloud, settings, progress)
 
-        self._request(_Request("Detecting", work, lambda r: self.detected.emit(cloud, r)))
+        self._request(_Request(tr("Detecting"), work, lambda r: self.detected.emit(cloud, r)))
 
     def edit(
         self, title: str, text: str, cloud: PointCloud, before: Result, change: Change
@@ -195,7 +196,7 @@ class Jobs(QObject):
 
     def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
         """Write something that takes its time."""
-        self._request(_Request("Exporting", write, lambda _: self.written.emit(path)))
+        self._request(_Request(tr("Exporting"), write, lambda _: self.written.emit(path)))
 
     def glance(
         self,

@@ -15,6 +15,7 @@ from pipegui.panels.properties import PropertiesPanel
 from pipegui.panels.settings_form import SettingsForm
 from pipegui.panels.stacks_panel import StacksPanel
 from pipegui.panels.welcome import Welcome
+from pipegui.texts import mark, tr
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -99,22 +100,22 @@ def arrange(window: "MainWindow") -> None:
     plots.setObjectName("plots")
     plots.setDocumentMode(True)
     for title, widget in (
-        ("Radius", parts.radius_plot),
-        ("Map", parts.map),
-        ("Section", parts.section),
-        ("Preview", parts.preview),
+        (tr("Radius"), parts.radius_plot),
+        (tr("Map"), parts.map),
+        (tr("Section"), parts.section),
+        (tr("Preview"), parts.preview),
     ):
         plots.addTab(widget, title)
     # A click on a tab means the plot: the arrow keys are then its own, not the tabs'.
     plots.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
     plots.tabBarClicked.connect(lambda i: plots.widget(i).setFocus() if i >= 0 else None)
 
-    _dock(window, "Project", panels.tree, LEFT)
-    _dock(window, "Stacks", panels.stacks, LEFT)
-    _dock(window, "Settings", panels.settings, LEFT)
-    _dock(window, "Element", plots, RIGHT)
-    _dock(window, "Properties", panels.properties, RIGHT)
-    _dock(window, "Deformations", panels.table, BOTTOM)
+    _dock(window, mark("Project"), panels.tree, LEFT)
+    _dock(window, mark("Stacks"), panels.stacks, LEFT)
+    _dock(window, mark("Settings"), panels.settings, LEFT)
+    _dock(window, mark("Element"), plots, RIGHT)
+    _dock(window, mark("Properties"), panels.properties, RIGHT)
+    _dock(window, mark("Deformations"), panels.table, BOTTOM)
     docks = panels.docks
     window.tabifyDockWidget(docks["Stacks"], docks["Settings"])
     docks["Stacks"].raise_()
@@ -124,7 +125,7 @@ def arrange(window: "MainWindow") -> None:
 
 
 def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
-    dock = QDockWidget(title, window)
+    dock = QDockWidget(tr(title), window)
     dock.setObjectName(title)
     dock.setWidget(widget)
     window.panels.docks[title] = dock
@@ -132,7 +133,7 @@ def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidget
 
 
 def _panel_menu(window: "MainWindow") -> QMenu:
-    menu = QMenu("Panels", window)
+    menu = QMenu(tr("Panels"), window)
     for dock in window.panels.docks.values():
         menu.addAction(dock.toggleViewAction())
     return menu

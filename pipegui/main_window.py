@@ -9,7 +9,6 @@ from PySide6.QtGui import QCloseEvent, QCursor, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QToolTip
 
 from pipecore.errors import PipecoreError
-from pipecore.report.summary import summarise
 from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
 from pipegui.actions import VIEW_OPTIONS, Actions
@@ -25,6 +24,7 @@ from pipegui.parts import Parts
 from pipegui.previewing import Previews
 from pipegui.project_file import SUFFIX
 from pipegui.projects import Projects
+from pipegui.texts import inside, tr
 from pipegui.toolbar import ToolBar
 from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
 
@@ -78,6 +78,7 @@ class MainWindow(QMainWindow):
         QApplication.styleHints().colorSchemeChanged.connect(self.refresh_colours)
         self._apply(resolve(self.history.document), everything=True)
         self.menu_actions.restore_appearance()
+        self.menu_actions.show_language()
 
     @property
     def document(self) -> Document:
@@ -132,14 +133,14 @@ class MainWindow(QMainWindow):
     def take_result(self, cloud: PointCloud, result: Result) -> None:
         """Show what was detected, and say it in a line."""
         self.do(commands.set_result, cloud, result)
-        hint = "" if result.elements else ". Check the length unit and the smallest radius"
+        hint = "" if result.elements else tr(". Check the length unit and the smallest radius")
         seconds = sum(result.seconds.values())
-        took = f" Detected in {seconds:.0f} s." if seconds >= 1 else ""
+        took = tr(" Detected in {seconds:.0f} s.").format(seconds=seconds) if seconds >= 1 else ""
         severity = "info" if result.elements else "warning"
         # Another scan may be looked at meanwhile.
         scan = next((s for s in self.document.scans if s.cloud is cloud), None)
         whose = f"{scan.name}: " if scan is not None and scan is not self.document.scan else ""
-        self.panels.message.tell(f"{whose}{summarise(result)}{hint}.{took}", severity)
+        self.panels.message.tell(f"{whose}{describe.summary(result)}{hint}.{took}", severity)
 
     def choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
         """Select what was chosen in the tree, in another scan if it is there."""
@@ -247,9 +248,11 @@ class MainWindow(QMainWindow):
                 "redo": bool(self.history.redo_text),
             }
         )
-        for name in ("undo", "redo"):
-            what = getattr(self.history, f"{name}_text")
-            self.actions_[name].setText(f"{name.capitalize()} {what[:1].lower()}{what[1:]}".strip())
+        undo, redo = self.history.undo_text, self.history.redo_text
+        undo_text = tr("Undo {what}").format(what=inside(tr(undo))) if undo else tr("Undo")
+        redo_text = tr("Redo {what}").format(what=inside(tr(redo))) if redo else tr("Redo")
+        self.actions_["undo"].setText(undo_text)
+        self.actions_["redo"].setText(redo_text)
 
     # Qt
 

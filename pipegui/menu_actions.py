@@ -15,12 +15,18 @@ from pipecore.settings import Settings
 from pipegui import commands, describe, files, theme
 from pipegui.command_search import CommandSearch
 from pipegui.shortcut_list import ShortcutList
+from pipegui.texts import LANGUAGES, inside, mark, tr
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
     from pipegui.plots.chart import Chart
 
-CSV = "Tables (*.csv)"
+CSV = mark("Tables (*.csv)")
+EXPORT = {
+    "deformations": mark("Export deformations"),
+    "elements": mark("Export elements"),
+    "profiles": mark("Export profiles"),
+}
 
 
 class MenuActions:
@@ -46,7 +52,7 @@ class MenuActions:
         """Bring the menu of recent files up to date."""
         window = self._window
         if self._recent_menu is None:
-            self._recent_menu = QMenu("Open recent", window)
+            self._recent_menu = QMenu(tr("Open recent"), window)
             file_menu = window.actions_.menus["File"]
             file_menu.insertMenu(window.actions_["save"], self._recent_menu)
             file_menu.insertSeparator(window.actions_["save"])
@@ -65,14 +71,14 @@ class MenuActions:
         """Bring the menu of steps up to date: a click goes back or forward to a step."""
         window, history = self._window, self._window.history
         if self._history_menu is None:
-            self._history_menu = QMenu("History", window)
+            self._history_menu = QMenu(tr("History"), window)
             edit_menu = window.actions_.menus["Edit"]
             edit_menu.insertMenu(window.actions_["go_up"], self._history_menu)
             edit_menu.aboutToShow.connect(self.list_history)
         menu = self._history_menu
         menu.clear()
         menu.setEnabled(bool(history.steps))
-        for n_done, text in enumerate(["Start", *history.steps]):
+        for n_done, text in enumerate([tr("Start"), *map(tr, history.steps)]):
             action = menu.addAction(text)
             action.setCheckable(True)
             action.setChecked(n_done == history.n_done)
@@ -97,6 +103,21 @@ class MenuActions:
             key = f"appearance_{appearance.name.lower()}"
             self._window.actions_.set_checked(key, appearance is chosen)
 
+    # Language
+
+    def choose_language(self, code: str) -> None:
+        """Speak another language ("": the system's) when the window is next opened."""
+        self._window.stored.setValue("language", code)
+        self.show_language()
+        self._window.panels.message.tell(tr("The language changes at the next start."))
+
+    def show_language(self) -> None:
+        """Check the language that was chosen last."""
+        chosen = str(self._window.stored.value("language", ""))
+        for code in LANGUAGES:
+            key = f"language_{code or 'system'}"
+            self._window.actions_.set_checked(key, code == chosen)
+
     # Settings
 
     def load_settings(self) -> None:
@@ -117,7 +138,7 @@ class MenuActions:
             with pipecore.io.write_file(path) as temporary:
                 temporary.write_text(self._window.document.settings.to_toml(), encoding="utf-8")
 
-        self._save("Save settings", "settings.toml", "Settings (*.toml)", write)
+        self._save(tr("Save settings"), "settings.toml", tr("Settings (*.toml)"), write)
 
     # Exporting
 
@@ -131,29 +152,29 @@ class MenuActions:
         content = (scan.result, scan.reviews) if table == "deformations" else (scan.result,)
         write = getattr(report, f"write_{table}_csv")
         name = f"{self._stem()} {table}.csv"
-        self._save(f"Export {table}", name, CSV, lambda path: write(path, *content))
+        self._save(tr(EXPORT[table]), name, tr(CSV), lambda path: write(path, *content))
 
     def export_picture(self) -> None:
         """Ask where to, and save what the 3D view shows."""
 
         def write(path: Path) -> None:
             if not self._window.parts.scene.screenshot().save(str(path)):
-                raise WriteError("the folder cannot be written to.")
+                raise WriteError(tr("the folder cannot be written to."))
 
-        self._save("Save picture", f"{self._stem()}.png", "Pictures (*.png)", write)
+        self._save(tr("Save picture"), f"{self._stem()}.png", tr("Pictures (*.png)"), write)
 
     def save_plot(self, plot: "Chart", ending: str) -> None:
         """Ask where to, and save a plot as a picture or as numbers."""
         what = plot.accessibleName()
         selected = describe.title(self._window.document.result, self._window.document.selection)
         name = f"{self._stem()} {selected.replace(' · ', ' ')} {what.lower()}.{ending}"
-        names = {"png": "Pictures (*.png)", "svg": "Drawings (*.svg)", "csv": CSV}
+        names = {"png": tr("Pictures (*.png)"), "svg": tr("Drawings (*.svg)"), "csv": CSV}
 
         def write(path: Path) -> None:
             with pipecore.io.write_file(path) as temporary:
                 temporary.write_bytes(plot.as_file(ending))
 
-        self._save(f"Save {what.lower()}", name, names[ending], write)
+        self._save(tr("Save {what}").format(what=inside(what)), name, names[ending], write)
 
     def export_report(self) -> None:
         """Ask where to, and write the whole report in the background."""
@@ -184,9 +205,11 @@ class MenuActions:
         try:
             write(path)
         except (PipecoreError, OSError) as error:
-            window.panels.message.tell(f"“{path}” was not saved: {error}", "error")
+            window.panels.message.tell(
+                tr("“{path}” was not saved: {error}").format(path=path, error=error), "error"
+            )
         else:
-            window.panels.message.tell(f"Saved “{path}”.")
+            window.panels.message.tell(tr("Saved “{path}”.").format(path=path))
 
     # Help
 
@@ -204,11 +227,13 @@ class MenuActions:
         """Say which version this is."""
         box = QMessageBox(self._window)
         box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        box.setWindowTitle("About PipeGUI")
+        box.setWindowTitle(tr("About PipeGUI"))
         box.setText(f"PipeGUI {pipecore.__version__}")
         box.setInformativeText(
-            "Finds pipes in laser scans, measures them, and shows where they are deformed.\n\n"
-            "After Mapurisa and Sithole, “Deformation detection in piping installations using "
-            "profiling techniques”."
+            tr(
+                "Finds pipes in laser scans, measures them, and shows where they are deformed.\n\n"
+                "After Mapurisa and Sithole, “Deformation detection in piping installations using "
+                "profiling techniques”."
+            )
         )
         box.open()

@@ -14,6 +14,7 @@ from pipecore.errors import SettingsError
 from pipecore.io import write_file
 from pipecore.resources import resource
 from pipecore.settings import Settings
+from pipegui.texts import mark, tr
 
 OF_THE_SCAN = ("input.length_unit", "stacks.directions")
 """Settings that no preset touches."""
@@ -28,6 +29,11 @@ class Preset:
     path: Path | None = None
     is_own: bool = False
     description: str = ""
+
+    @property
+    def shown_name(self) -> str:
+        """The name in the language of the window; the user's own stay as they are."""
+        return self.name if self.is_own else tr(self.name)
 
     def load(self) -> Settings:
         """Return the settings.
@@ -58,7 +64,7 @@ class Presets:
         names = {preset.name for preset in built_in} | {STANDARD}
         paths = sorted(self._folder.glob("*.toml"), key=lambda path: path.stem.casefold())
         own = [Preset(path.stem, path, True) for path in paths if path.stem not in names]
-        return [Preset(STANDARD, description="The program's defaults."), *built_in, *own]
+        return [Preset(STANDARD, description=mark("The program's defaults.")), *built_in, *own]
 
     def matching(self, settings: Settings) -> Preset | None:
         """Return the preset that gives these settings, if one does."""
@@ -74,11 +80,15 @@ class Presets:
         """Say why settings cannot be kept under a name; "" if they can."""
         name = name.strip()
         if not name:
-            return "Give it a name."
+            return tr("Give it a name.")
         if not re.fullmatch(r"[\w(][\w .,()+-]*", name) or name.endswith("."):
-            return "Use letters, digits, spaces and . , ( ) + - _ only."
+            return tr("Use letters, digits, spaces and . , ( ) + - _ only.")
         taken = {preset.name.casefold() for preset in self.every() if not preset.is_own}
-        return f"“{name}” comes with the program." if name.casefold() in taken else ""
+        return (
+            tr("“{name}” comes with the program.").format(name=name)
+            if name.casefold() in taken
+            else ""
+        )
 
     def save(self, name: str, settings: Settings) -> Preset:
         """Keep settings under a name, in place of what it meant before.

@@ -14,6 +14,7 @@ from pipecore.settings import Settings
 from pipecore.types import PointCloud
 from pipegui.jobs import Jobs
 from pipegui.plan_state import PlanState, PreviewState
+from pipegui.texts import tr
 
 if TYPE_CHECKING:
     from pipecore.preview import Plan, ProfilePreview
@@ -77,7 +78,7 @@ class Previews(QObject):
         if self._wish is None:
             self._forget("")
         elif not self._wish.has_same_plan(before):
-            self._forget("Looking at the cloud …")
+            self._forget(tr("Looking at the cloud …"))
         elif before is not None and before.settings != settings:
             self._soon.start()
 

@@ -30,6 +30,7 @@ from pipegui.cloud_reference import CloudReference, CloudState
 from pipegui.document import Document, Scan, Selection, ViewOptions
 from pipegui.plain import from_plain, to_plain
 from pipegui.project_check import check_result
+from pipegui.texts import tr
 
 SUFFIX = ".pipegui"
 FORMAT = "pipegui project"
@@ -59,14 +60,23 @@ class SavedScan:
         """Return the scan with its cloud; `ProjectError` if that does not fit."""
         if len(cloud) != self.cloud.n_points:
             raise ProjectError(
-                f"“{cloud.source}” holds {len(cloud):,} points, but “{self.name}” had "
-                f"{self.cloud.n_points:,} when the project was saved: it is another scan."
+                tr(
+                    "“{source}” holds {cloud:,} points, but “{name}” had {n_points:,} when "
+                    "the project was saved: it is another scan."
+                ).format(
+                    source=cloud.source,
+                    cloud=len(cloud),
+                    name=self.name,
+                    n_points=self.cloud.n_points,
+                )
             )
         result = self.result and replace(self.result, source=cloud.source)
         if result is not None and not np.allclose(result.origin, cloud.origin, rtol=0, atol=1e-6):
             raise ProjectError(
-                f"“{cloud.source}” lies elsewhere than “{self.name}” did when the project was "
-                "saved: it is another scan, or was read in another unit."
+                tr(
+                    "“{source}” lies elsewhere than “{name}” did when the project was saved: "
+                    "it is another scan, or was read in another unit."
+                ).format(source=cloud.source, name=self.name)
             )
         return Scan(self.name, cloud, result, self.reviews, self.cloud.length_unit)
 
@@ -209,11 +219,19 @@ def read_project(path: Path, progress: Progress | None = None) -> SavedProject:
     except PipecoreError:
         raise
     except FileNotFoundError as error:
-        raise ProjectError(f"There is no file “{path}”.") from error
+        raise ProjectError(tr("There is no file “{path}”.").format(path=path)) from error
     except OSError as error:
-        raise ProjectError(f"“{path}” cannot be read ({error.strerror or error}).") from error
+        raise ProjectError(
+            tr("“{path}” cannot be read ({reason}).").format(
+                path=path, reason=error.strerror or error
+            )
+        ) from error
     except Exception as error:  # whatever a damaged file makes zip, JSON or NumPy raise
-        raise ProjectError(f"“{path.name}” is not a project, or is damaged ({error}).") from error
+        raise ProjectError(
+            tr("“{name}” is not a project, or is damaged ({error}).").format(
+                name=path.name, error=error
+            )
+        ) from error
 
 
 def _read(path: Path, archive: zipfile.ZipFile, progress: Progress) -> SavedProject:
@@ -225,8 +243,9 @@ def _read(path: Path, archive: zipfile.ZipFile, progress: Progress) -> SavedProj
         raise ValueError("it has no version")
     if version > FORMAT_VERSION:
         raise ProjectError(
-            f"“{path.name}” was saved by a newer PipeGUI ({contents.get('program')}). "
-            "Update this program to open it."
+            tr(
+                "“{name}” was saved by a newer PipeGUI ({program}). Update this program to open it."
+            ).format(name=path.name, program=contents.get("program"))
         )
     plain_scans = contents["scans"]
     scans = []

@@ -15,6 +15,7 @@ from pipegui.document import Document, Scan
 from pipegui.jobs import Jobs
 from pipegui.project_file import SUFFIX, SavedProject, read_project, work_of, write_project
 from pipegui.rescue import Rescue
+from pipegui.texts import tr
 from pipegui.worker import JobProgress
 
 if TYPE_CHECKING:
@@ -89,7 +90,11 @@ class Projects(QObject):
         window, scan = self._window, self.document.scan
         name = (self.path or Path(scan.name if scan is not None else "pipes")).stem + SUFFIX
         path = files.ask_target(
-            window, window.stored, "Save project", name, f"Projects (*{SUFFIX})"
+            window,
+            window.stored,
+            tr("Save project"),
+            name,
+            tr("Projects (*{suffix})").format(suffix=SUFFIX),
         )
         if path is not None:
             self._write(path, then)
@@ -104,12 +109,12 @@ class Projects(QObject):
             self.path, self._saved = path, work_of(document)
             self._remember(path)
             self.show_title()
-            self._window.panels.message.tell(f"Saved “{path}”.")
+            self._window.panels.message.tell(tr("Saved “{path}”.").format(path=path))
             if self.rescue is not None and not self.has_unsaved_work:
                 self.rescue.forget()
             then()
 
-        self.saving.run(f"Saving {path.name}", write, done)
+        self.saving.run(tr("Saving {name}").format(name=path.name), write, done)
 
     def _remember(self, path: Path) -> None:
         files.remember(self._window.stored, path)
@@ -125,8 +130,8 @@ class Projects(QObject):
         scan = self.document.scan
         name = self.path.stem if self.path is not None else scan.name if scan is not None else ""
         box = self._question(
-            f"Save the work on “{name}”?",
-            "What was detected, edited and reviewed since the last save would be lost.",
+            tr("Save the work on “{name}”?").format(name=name),
+            tr("What was detected, edited and reviewed since the last save would be lost."),
         )
         box.setStandardButtons(Button.Save | Button.Discard | Button.Cancel)
         box.setDefaultButton(Button.Save)
@@ -186,7 +191,7 @@ class Projects(QObject):
         def work(progress: JobProgress) -> SavedProject:
             return read_project(path, progress)
 
-        self._window.jobs.run(f"Opening {path.name}", work, self._locate)
+        self._window.jobs.run(tr("Opening {name}").format(name=path.name), work, self._locate)
 
     def _locate(self, saved: SavedProject) -> None:
         """Have the user find the clouds that are not where they were, one after the other."""
@@ -216,11 +221,14 @@ class Projects(QObject):
         go_on: Callable[[], object],
     ) -> None:
         name, is_changed = saved.scans[number].name, state is CloudState.CHANGED
-        what = "has changed since the project was saved" if is_changed else "is not there"
-        box = self._question(f"The scan “{name}” {what}.", f"Looked for at {path}")
-        locate = box.addButton("Locate…", Role.AcceptRole)
-        use = box.addButton("Use it all the same", Role.AcceptRole) if is_changed else None
-        leave_out = box.addButton("Leave it out", Role.DestructiveRole)
+        what = tr("has changed since the project was saved") if is_changed else tr("is not there")
+        box = self._question(
+            tr("The scan “{name}” {what}.").format(name=name, what=what),
+            tr("Looked for at {path}").format(path=path),
+        )
+        locate = box.addButton(tr("Locate…"), Role.AcceptRole)
+        use = box.addButton(tr("Use it all the same"), Role.AcceptRole) if is_changed else None
+        leave_out = box.addButton(tr("Leave it out"), Role.DestructiveRole)
         box.addButton(Button.Cancel)
         box.setDefaultButton(locate)
 
@@ -253,12 +261,16 @@ class Projects(QObject):
                 except CancelledError:
                     raise
                 except ReadError as error:
-                    raise ReadError(f"The project was not opened: {error}") from error
+                    raise ReadError(
+                        tr("The project was not opened: {error}").format(error=error)
+                    ) from error
                 scans.append(scan.with_cloud(replace(cloud, source=path)))
             return tuple(scans)
 
         self._window.jobs.run(
-            f"Reading the scans of {saved.path.name}", work, lambda scans: self._show(saved, scans)
+            tr("Reading the scans of {name}").format(name=saved.path.name),
+            work,
+            lambda scans: self._show(saved, scans),
         )
 
     def _show(self, saved: SavedProject, scans: tuple[Scan, ...]) -> None:
@@ -277,14 +289,14 @@ class Projects(QObject):
         self.show_title()
         if is_rescued and self.rescue is not None:
             self.rescue.take_over()
-            self.tell("The unsaved work was restored. Save it now.", "warning")
+            self.tell(tr("The unsaved work was restored. Save it now."), "warning")
             return
         self._remember(saved.path)
         if is_whole:
-            window.panels.message.tell(f"Opened “{saved.path}”.")
+            window.panels.message.tell(tr("Opened “{path}”.").format(path=saved.path))
         else:
             window.panels.message.tell(
-                "Some scans were left out; “Save” will ask for another file.", "warning"
+                tr("Some scans were left out; “Save” will ask for another file."), "warning"
             )
 
     def _is_rescued(self, saved: SavedProject) -> bool:

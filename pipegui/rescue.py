@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QLockFile, QObject, QTimer
 
 from pipegui.project_file import SUFFIX, work_of, write_project
+from pipegui.texts import tr
 from pipegui.worker import JobProgress
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ class Rescue(QObject):
             self._kept = work
             then()
 
-        projects.saving.run("Keeping a copy", write, done)
+        projects.saving.run(tr("Keeping a copy"), write, done)
 
     def forget(self) -> None:
         """Delete the copy: the work is saved."""
@@ -80,9 +81,9 @@ class Rescue(QObject):
                 continue
             self._offered = path, lock
             self._projects.tell(
-                "PipeGUI did not end properly last time. Unsaved work can be restored.",
+                tr("PipeGUI did not end properly last time. Unsaved work can be restored."),
                 "warning",
-                answers={"Restore": self.restore, "Delete it": self.drop},
+                answers={tr("Restore"): self.restore, tr("Delete it"): self.drop},
             )
             return
 

@@ -16,23 +16,24 @@ from PySide6.QtWidgets import (
 
 from pipegui import theme
 from pipegui.actions import MENUS
+from pipegui.texts import mark, plain_title, tr
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
 
 IN_PANELS = {
-    "Deformations": (
-        ("↑ ↓", "Previous and next deformation"),
-        ("F2", "Write a comment, choose a review"),
-        ("Ctrl+A", "Select all rows"),
-        ("Ctrl+C", "Copy rows for a spreadsheet"),
+    mark("Deformations"): (
+        ("↑ ↓", mark("Previous and next deformation")),
+        ("F2", mark("Write a comment, choose a review")),
+        ("Ctrl+A", mark("Select all rows")),
+        ("Ctrl+C", mark("Copy rows for a spreadsheet")),
     ),
-    "Plots": (
-        ("← →", "Previous and next profile"),
-        ("Page Up, Page Down", "Ten profiles further"),
-        ("Home, End", "First and last profile"),
-        ("Ctrl+C", "Copy the numbers"),
-        ("Ctrl+Shift+C", "Copy the picture"),
+    mark("Plots"): (
+        ("← →", mark("Previous and next profile")),
+        (mark("Page Up, Page Down"), mark("Ten profiles further")),
+        (mark("Home, End"), mark("First and last profile")),
+        ("Ctrl+C", mark("Copy the numbers")),
+        ("Ctrl+Shift+C", mark("Copy the picture")),
     ),
 }
 """Keys that are not in the menus: they work while the panel has the focus."""
@@ -46,16 +47,21 @@ class ShortcutList(QDialog):
         super().__init__(window)
         self.setObjectName("shortcuts")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setWindowTitle("Keyboard shortcuts")
+        self.setWindowTitle(tr("Keyboard shortcuts"))
         groups = {
-            menu: [
-                (_text(window.actions_[spec.name].shortcut()), spec.text.rstrip("…"))
+            plain_title(tr(menu)): [
+                (_text(window.actions_[spec.name].shortcut()), tr(spec.text).rstrip("…"))
                 for spec in specs
                 if spec is not None and spec.shortcut
             ]
             for menu, specs in MENUS.items()
         }
-        groups |= {f"In the panel: {name}": list(keys) for name, keys in IN_PANELS.items()}
+        groups |= {
+            tr("In the panel: {name}").format(name=tr(name)): [
+                (tr(key), tr(what)) for key, what in keys
+            ]
+            for name, keys in IN_PANELS.items()
+        }
         body = QWidget()
         grid = QGridLayout(body)
         grid.setHorizontalSpacing(4 * theme.SPACING)

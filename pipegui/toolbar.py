@@ -8,6 +8,7 @@ from pipegui.actions import Actions
 from pipegui.commands import colours_of
 from pipegui.document import ColourBy
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+from pipegui.texts import tr
 from pipegui.view_state import WindowState
 
 
@@ -40,23 +41,23 @@ class ToolBar(QToolBar):
             self.addAction(actions[name])
         self.addSeparator()
         self.colour = QuietComboBox()
-        self.colour.setAccessibleName("Colour by")
-        self.colour.setToolTip("What the colour of the points means")
+        self.colour.setAccessibleName(tr("Colour by"))
+        self.colour.setToolTip(tr("What the colour of the points means"))
         self.colour.setSizeAdjustPolicy(QuietComboBox.SizeAdjustPolicy.AdjustToContents)
         self.colour.currentIndexChanged.connect(self._tell_colour)
         self.limit = QuietSpinBox()
-        self.limit.setAccessibleName("Deviation limits")
-        self.limit.setToolTip("Deviations from − to + this are told apart by colour")
+        self.limit.setAccessibleName(tr("Deviation limits"))
+        self.limit.setToolTip(tr("Deviations from − to + this are told apart by colour"))
         self.limit.setRange(0.5, 500)
         self.limit.setPrefix("± ")
         self.limit.setSuffix(" mm")
         self.limit.valueChanged.connect(self._tell_limit)
-        self.addWidget(QLabel("Colour by"))
+        self.addWidget(QLabel(tr("Colour by")))
         self.addWidget(self.colour)
-        self._limit_label = self.addWidget(QLabel("Limits"))
+        self._limit_label = self.addWidget(QLabel(tr("Limits")))
         self._limit_action = self.addWidget(self.limit)
         self.addSeparator()
-        self.addWidget(QLabel("Deformations"))
+        self.addWidget(QLabel(tr("Deformations")))
         for name in ("previous_deformation", "next_deformation"):
             self.addAction(actions[name])
 
@@ -68,7 +69,7 @@ class ToolBar(QToolBar):
             if tuple(self.colour.itemData(i) for i in range(self.colour.count())) != offered:
                 self.colour.clear()
                 for colour in offered:
-                    self.colour.addItem(str(colour), colour)
+                    self.colour.addItem(tr(colour), colour)
             self.colour.setCurrentIndex(self.colour.findData(state.view.colour_by))
             self.limit.setValue(state.view.deviation_limit_mm)
         shows_deviation = state.scan is not None and state.view.colour_by is ColourBy.DEVIATION

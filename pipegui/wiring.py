@@ -11,6 +11,7 @@ from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
 from pipegui.panel_focus import go_to_next_panel
 from pipegui.presets import Presets
+from pipegui.texts import LANGUAGES, tr
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -89,6 +90,9 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
     for appearance in theme.Appearance:
         name = f"appearance_{appearance.name.lower()}"
         found[name] = lambda _, a=appearance: menu.choose_appearance(a)
+    for code in LANGUAGES:
+        name = f"language_{code or 'system'}"
+        found[name] = lambda _, c=code: menu.choose_language(c)
     for name in VIEW_OPTIONS:
         found[name] = lambda on, name=name: do(commands.set_view, **{name: on})
     return found
@@ -145,7 +149,10 @@ def _click(window: "MainWindow", point_index: int) -> None:
         world = scan.cloud.world(scan.cloud.xyz[point_index])
         QGuiApplication.clipboard().setText("\t".join(f"{v:.3f}" for v in world))
         window.statusBar().showMessage(
-            f"Copied: {describe.coordinates(scan.cloud, point_index)}", 4000
+            tr("Copied: {coordinates}").format(
+                coordinates=describe.coordinates(scan.cloud, point_index)
+            ),
+            4000,
         )
 
 
@@ -228,7 +235,7 @@ def connect_jobs(window: "MainWindow") -> None:
     jobs.ended.connect(status.end)
     jobs.beside.connect(status.show_beside)
     jobs.busy_changed.connect(lambda _: window.update_actions())
-    jobs.cancelled.connect(lambda title: tell(f"{title} was cancelled."))
+    jobs.cancelled.connect(lambda title: tell(tr("{title} was cancelled.").format(title=title)))
     jobs.failed.connect(lambda message, details: tell(message, "error", details))
     jobs.scan_read.connect(window.take_scan)
     jobs.detected.connect(window.take_result)
@@ -236,4 +243,4 @@ def connect_jobs(window: "MainWindow") -> None:
     if (rescue := window.projects.rescue) is not None:
         jobs.detected.connect(lambda *_: rescue.keep())
         jobs.edited.connect(lambda _: rescue.keep())
-    jobs.written.connect(lambda path: tell(f"Saved “{path}”."))
+    jobs.written.connect(lambda path: tell(tr("Saved “{path}”.").format(path=path)))

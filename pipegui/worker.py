@@ -18,6 +18,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from pipecore.errors import CancelledError, PipecoreError
+from pipegui.texts import tr
 
 
 @dataclass(frozen=True)
@@ -217,10 +218,12 @@ def _end_of(progress: JobProgress, job: int, work: Work) -> Event:
     except MemoryError:
         return Failed(
             job,
-            "There is not enough memory for this scan. Close other programs or thin the scan.",
+            tr("There is not enough memory for this scan. Close other programs or thin the scan."),
             traceback.format_exc(),
         )
     except BaseException as error:  # a thread must not die of its work
-        what = f"Something went wrong inside the program ({type(error).__name__})."
-        message = f"{what} Your scans and earlier results are safe."
+        what = tr("Something went wrong inside the program ({kind}).").format(
+            kind=type(error).__name__
+        )
+        message = tr("{what} Your scans and earlier results are safe.").format(what=what)
         return Failed(job, message, traceback.format_exc())

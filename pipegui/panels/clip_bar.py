@@ -7,9 +7,13 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 from pipegui import describe, theme
 from pipegui.document import Box
 from pipegui.panels.widgets import Applying, QuietSpinBox
+from pipegui.texts import mark, tr
 from pipegui.view_state import ClipState
 
 STEP = 0.05
+
+FIELD_NAMES = (mark("Clip box, lower {axis}"), mark("Clip box, upper {axis}"))
+FIELD_TIPS = (mark("Lower end along {axis}, metres"), mark("Upper end along {axis}, metres"))
 
 
 class ClipBar(QWidget):
@@ -45,9 +49,9 @@ class ClipBar(QWidget):
                     lambda value, axis=axis, side=side: self._tell(axis, side, value)
                 )
                 row.addWidget(field, 1)
-        self.whole = self._button("All", self.whole_requested)
-        self.selection = self._button("Selection", self.selection_requested)
-        self.close_ = self._button("Off", self.closed)
+        self.whole = self._button(tr("All"), self.whole_requested)
+        self.selection = self._button(tr("Selection"), self.selection_requested)
+        self.close_ = self._button(tr("Off"), self.closed)
         for button in (self.whole, self.selection, self.close_):
             row.addWidget(button)
         self.hide()
@@ -65,8 +69,8 @@ class ClipBar(QWidget):
                 self._names[axis].setText(name)
                 for side, local in enumerate((state.box.low, state.box.high)):
                     field = self.ends[axis][side]
-                    field.setAccessibleName(f"Clip box, {('lower', 'upper')[side]} {name}")
-                    field.setToolTip(f"{('Lower', 'Upper')[side]} end along {name}, metres")
+                    field.setAccessibleName(tr(FIELD_NAMES[side]).format(axis=name))
+                    field.setToolTip(tr(FIELD_TIPS[side]).format(axis=name))
                     field.setValue(local[axis] + float(self._origin[axis]))
 
     def _button(self, text: str, signal: Signal) -> QToolButton:

@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from pipecore.settings import ProfileMethod
 from pipegui import theme
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+from pipegui.texts import first_capital, tr
 from pipegui.view_state import StacksState
 
 
@@ -18,19 +19,22 @@ class CuttingFields(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._applying = Applying()
-        self.width_mm = self._length("Profile width", "stacks.width_mm")
-        self.width_mm.setToolTip("Thickness of a profile; 0 follows the spacing of the points")
-        self.gap_mm = self._length("Largest gap", "profiles.gap_mm")
+        self.width_mm = self._length(tr("Profile width"), "stacks.width_mm")
+        self.width_mm.setToolTip(tr("Thickness of a profile; 0 follows the spacing of the points"))
+        self.gap_mm = self._length(tr("Largest gap"), "profiles.gap_mm")
         self.gap_mm.setToolTip(
-            "Points of one curve are at most this far apart; 0 follows the spacing of the points"
+            tr(
+                "Points of one curve are at most this far apart; 0 follows the spacing of "
+                "the points"
+            )
         )
         self.method = QuietComboBox()
-        self.method.setAccessibleName("Method")
+        self.method.setAccessibleName(tr("Method"))
         self.method.setToolTip(
-            "Proximity alone, or proximity and splitting where the curvature changes sharply"
+            tr("Proximity alone, or proximity and splitting where the curvature changes sharply")
         )
         for method in ProfileMethod:
-            self.method.addItem(str(method).capitalize(), method)
+            self.method.addItem(first_capital(tr(method)), method)
         self.method.currentIndexChanged.connect(
             lambda _: self._tell("profiles.method", ProfileMethod(self.method.currentData()))
         )
@@ -38,7 +42,11 @@ class CuttingFields(QWidget):
         grid.setContentsMargins(theme.SPACING, 0, theme.SPACING, 0)
         grid.setSpacing(theme.SPACING // 2)
         for place, (text, field, span) in enumerate(
-            (("Width", self.width_mm, 1), ("Gap", self.gap_mm, 1), ("Method", self.method, 3))
+            (
+                (tr("Width"), self.width_mm, 1),
+                (tr("Gap"), self.gap_mm, 1),
+                (tr("Method"), self.method, 3),
+            )
         ):
             label = QLabel(text)
             label.setBuddy(field)
@@ -53,7 +61,7 @@ class CuttingFields(QWidget):
         field.setAccessibleName(name)
         field.setRange(0, 1000)
         field.setSuffix(" mm")
-        field.setSpecialValueText("automatic")
+        field.setSpecialValueText(tr("automatic"))
         field.setMinimumWidth(8 * theme.SPACING)
         field.valueChanged.connect(lambda value: self._tell(key, value))
         return field

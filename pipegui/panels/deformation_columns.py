@@ -10,11 +10,11 @@ from pipecore.report.format import (
     cell,
     format_clock,
     format_coordinate,
-    format_measure,
 )
 from pipecore.report.summary import VERDICT_ORDER
 from pipecore.rules import outside_diameter
 from pipecore.types import Deformation, Element, Result, Review, ReviewState
+from pipegui.texts import format_measure, label_of, mark, tr
 
 REVIEW_ORDER = tuple(ReviewState)
 
@@ -55,7 +55,7 @@ class Column:
 
     def why_not(self, row: Row) -> str:
         """Why a cell holds no number."""
-        default = "The scan does not carry this number: its arc is too short, or too noisy."
+        default = tr("The scan does not carry this number: its arc is too short, or too noisy.")
         return row.deformation.not_measurable.get(self.field, default)
 
 
@@ -95,13 +95,14 @@ def _text(
     sort_key: Callable[[Row], Any] | None = None,
     hint: str = "",
     *,
+    plain: Callable[[Row], str] | None = None,
     is_shown_first: bool = True,
 ) -> Column:
     return Column(
         key,
         title,
         text,
-        text,
+        plain or text,
         sort_key or (lambda row: text(row).casefold()),
         hint,
         is_text=True,
@@ -116,7 +117,7 @@ def _coordinate(key: str, title: str, axis: int) -> Column:
         lambda row: format_coordinate(float(row.peak[axis])),
         lambda row: cell(float(row.peak[axis]), 4),
         lambda row: float(row.peak[axis]),
-        "Of the peak, in the coordinates of the scan",
+        mark("Of the peak, in the coordinates of the scan"),
         is_shown_first=False,
     )
 
@@ -127,43 +128,53 @@ def _fitting(row: Row) -> str:
     if fitting is None:  # there is none, or it was deleted since
         return ""
     if fitting.element_id == row.element.element_id:
-        return f"on {fitting.label}"
-    return f"{fitting.label}: {row.deformation.fitting_distance:.2f} m"
+        return tr("on {label}").format(label=label_of(fitting))
+    return f"{label_of(fitting)}: {row.deformation.fitting_distance:.2f} m"
 
 
 def _neighbour(row: Row) -> str:
     if not row.deformation.next_id:
         return ""
     text = f"{row.deformation.next_id}: {row.deformation.next_distance:.2f} m"
-    return f"{text}, interacts" if row.deformation.interacts else text
+    return tr("{text}, interacts").format(text=text) if row.deformation.interacts else text
 
 
 COLUMNS = (
     _number("deformation_id", "#", lambda r: r.deformation.deformation_id, 0),
-    _text("element", "Element", lambda r: r.element.label, lambda r: r.element.element_id),
-    _text("kind", "Kind", lambda r: str(r.deformation.kind)),
+    _text(
+        "element",
+        mark("Element"),
+        lambda r: label_of(r.element),
+        lambda r: r.element.element_id,
+        plain=lambda r: r.element.label,
+    ),
+    _text(
+        "kind", mark("Kind"), lambda r: tr(r.deformation.kind), plain=lambda r: r.deformation.kind
+    ),
     Column(
         "clock",
-        "Clock",
+        mark("Clock"),
         lambda r: format_clock(r.deformation.clock),
         lambda r: format_clock(r.deformation.clock),
         lambda r: r.deformation.clock,
-        "Looking along increasing chainage, 12:00 up; on a vertical pipe 12:00 is grid north.",
+        mark(
+            "Looking along increasing chainage, 12:00 up; on a vertical pipe 12:00 is grid north."
+        ),
     ),
     _number(
         "chainage_m",
-        "Chainage, m",
+        mark("Chainage, m"),
         lambda r: r.deformation.chainage,
         3,
-        "From the element’s start",
+        mark("From the element’s start"),
     ),
     Column(
         "depth_mm",
-        "Depth, mm",
+        mark("Depth, mm"),
         lambda r: format_measure(1000 * r.deformation.depth, 1000 * r.deformation.depth_sd),
         lambda r: cell(1000 * r.deformation.depth, 2),
         lambda r: r.deformation.depth,
-        "Gap to the undented contour, ± one standard deviation",
+        mark("Gap to the undented contour, ± one standard deviation"),
         field="depth",
     ),
     _number(
@@ -171,19 +182,25 @@ COLUMNS = (
         "% OD",
         lambda r: 100 * r.deformation.depth / outside_diameter(r.element),
         1,
-        "Depth in percent of the outside diameter",
+        mark("Depth in percent of the outside diameter"),
     ),
-    _number("length_mm", "Length, mm", lambda r: 1000 * r.deformation.length, 0, "Along the axis"),
+    _number(
+        "length_mm",
+        mark("Length, mm"),
+        lambda r: 1000 * r.deformation.length,
+        0,
+        mark("Along the axis"),
+    ),
     _number(
         "width_mm",
-        "Width, mm",
+        mark("Width, mm"),
         lambda r: 1000 * r.deformation.width,
         0,
-        "Around the circumference",
+        mark("Around the circumference"),
     ),
     _number(
         "ovality_pct",
-        "Ovality, %",
+        mark("Ovality, %"),
         lambda r: 100 * r.deformation.ovality,
         2,
         "(Dmax − Dmin) / Dnom",
@@ -191,48 +208,50 @@ COLUMNS = (
     ),
     _number(
         "area_cm2",
-        "Area, cm²",
+        mark("Area, cm²"),
         lambda r: 1e4 * r.deformation.area,
         0,
-        "What a dent or bulge covers of the undented surface",
+        mark("What a dent or bulge covers of the undented surface"),
         field="area",
         is_shown_first=False,
     ),
     _number(
         "volume_cm3",
-        "Volume, cm³",
+        mark("Volume, cm³"),
         lambda r: 1e6 * r.deformation.volume,
         1,
-        "Between the undented surface and the real one",
+        mark("Between the undented surface and the real one"),
         field="volume",
         is_shown_first=False,
     ),
     _number(
         "strain_pct",
-        "Strain, %",
+        mark("Strain, %"),
         lambda r: 100 * r.deformation.strain,
         1,
-        "After ASME B31.8; indicative only. Needs the wall thickness.",
+        mark("After ASME B31.8; indicative only. Needs the wall thickness."),
         field="strain",
         is_shown_first=False,
     ),
     Column(
         "fitting",
-        "Nearest fitting",
+        mark("Nearest fitting"),
         _fitting,
         _fitting,
         lambda r: r.deformation.fitting_distance,
-        "The nearest flange, bend or other fitting, and how far it is along the run",
+        mark("The nearest flange, bend or other fitting, and how far it is along the run"),
         is_text=True,
         is_shown_first=False,
     ),
     Column(
         "next",
-        "Next dent",
+        mark("Next dent"),
         _neighbour,
         _neighbour,
         lambda r: r.deformation.next_distance,
-        "The nearest other dent or bulge of the run. They interact within one outside diameter.",
+        mark(
+            "The nearest other dent or bulge of the run. They interact within one outside diameter."
+        ),
         is_text=True,
         is_shown_first=False,
     ),
@@ -240,33 +259,40 @@ COLUMNS = (
     _coordinate("peak_y", "Y (N), m", 1),
     _coordinate("peak_z", "Z (H), m", 2),
     _number(
-        "n_points", "Points", lambda r: r.deformation.n_points, 0, "In it", is_shown_first=False
+        "n_points",
+        mark("Points"),
+        lambda r: r.deformation.n_points,
+        0,
+        mark("In it"),
+        is_shown_first=False,
     ),
     _text(
         "verdict",
-        "Verdict",
-        lambda r: str(r.deformation.verdict),
+        mark("Verdict"),
+        lambda r: tr(r.deformation.verdict),
         lambda r: (VERDICT_ORDER.index(r.deformation.verdict), -r.deformation.depth),
+        plain=lambda r: r.deformation.verdict,
     ),
     _text(
         "rule",
-        "Rule",
+        mark("Rule"),
         lambda r: r.deformation.rule,
-        hint="The rule that gave the verdict",
+        hint=mark("The rule that gave the verdict"),
         is_shown_first=False,
     ),
     _text(
         "review",
-        "Review",
-        lambda r: str(r.review.state),
+        mark("Review"),
+        lambda r: tr(r.review.state),
         lambda r: REVIEW_ORDER.index(r.review.state),
-        "What you decided. Double-click or F2 to change it.",
+        mark("What you decided. Double-click or F2 to change it."),
+        plain=lambda r: r.review.state,
     ),
     _text(
         "comment",
-        "Comment",
+        mark("Comment"),
         lambda r: r.review.comment,
-        hint="Your own words. Double-click or F2 to write.",
+        hint=mark("Your own words. Double-click or F2 to write."),
     ),
 )
 INDEX = {column.key: i for i, column in enumerate(COLUMNS)}

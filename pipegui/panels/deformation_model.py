@@ -20,6 +20,7 @@ from pipecore.report.summary import by_verdict
 from pipecore.types import Deformation, DeformationKind, Result, Review, ReviewState, Verdict
 from pipegui import theme
 from pipegui.panels.deformation_columns import COLUMNS, INDEX, Row
+from pipegui.texts import tr
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
@@ -99,9 +100,9 @@ class DeformationModel(QAbstractTableModel):
             return None
         match role:
             case Role.DisplayRole:
-                return COLUMNS[section].title
+                return tr(COLUMNS[section].title)
             case Role.ToolTipRole:
-                return COLUMNS[section].hint or None
+                return tr(COLUMNS[section].hint) or None
             case Role.TextAlignmentRole:
                 return self._alignment(section)
         return None
@@ -132,7 +133,7 @@ class DeformationModel(QAbstractTableModel):
                 value = self._alignment(index.column())
             case Role.DecorationRole:
                 value = self._icon(row, index.column())
-            case Role.ForegroundRole if text == NOT_MEASURABLE or self._is_faint(row, index):
+            case Role.ForegroundRole if text == tr(NOT_MEASURABLE) or self._is_faint(row, index):
                 value = theme.colour("muted")
             case Role.ToolTipRole:
                 value = self._hint(row, index.column(), text)
@@ -150,11 +151,11 @@ class DeformationModel(QAbstractTableModel):
         return index.column() == REVIEW_COLUMN and row.review.state is ReviewState.OPEN
 
     def _hint(self, row: Row, column: int, text: str) -> str | None:
-        if text == NOT_MEASURABLE:
+        if text == tr(NOT_MEASURABLE):
             return COLUMNS[column].why_not(row)
         if column == VERDICT_COLUMN and row.deformation.rule:
-            return f"By the rule “{row.deformation.rule}”"
-        return COLUMNS[column].hint or (text if column == COMMENT_COLUMN else None)
+            return tr("By the rule “{rule}”").format(rule=row.deformation.rule)
+        return tr(COLUMNS[column].hint) or (text if column == COMMENT_COLUMN else None)
 
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
         """Tell what a person decided or wrote; the cell shows it once the document holds it."""

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.types import DeformationKind, ReviewState, Verdict
-from pipegui import theme
+from pipegui import describe, theme
 from pipegui.panels.deformation_columns import COLUMNS, INDEX, SHOWN_FIRST
 from pipegui.panels.deformation_model import (
     REVIEW_COLUMN,
@@ -28,18 +28,31 @@ from pipegui.panels.deformation_model import (
     DeformationModel,
 )
 from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
+from pipegui.texts import mark, tr
 from pipegui.view_state import TableState
 
-WAITING = (
+WAITING = mark(
     "Dents, bulges and other deformations appear here once pipes are detected.\n"
     "Open a scan and press Detect (Ctrl+D)."
 )
 ROOM = {"review": 12 * theme.SPACING, "comment": 24 * theme.SPACING}
 """Least widths of the columns that are still to be filled, in pixels."""
 DECISIONS = {
-    ReviewState.ACCEPTED: "Accept",
-    ReviewState.REJECTED: "Reject",
-    ReviewState.OPEN: "Leave open",
+    ReviewState.ACCEPTED: mark("Accept"),
+    ReviewState.REJECTED: mark("Reject"),
+    ReviewState.OPEN: mark("Leave open"),
+}
+
+FILTERS = {
+    "kind": (mark("Show only deformations of one kind"), mark("All kinds")),
+    "verdict": (mark("Show only deformations of one verdict"), mark("All verdicts")),
+    "review": (mark("Show only deformations of one review"), mark("Any review")),
+}
+"""Tip of each filter by a choice, and what stands for everything."""
+FILTER_NAMES = {
+    "kind": mark("Filter by kind"),
+    "verdict": mark("Filter by verdict"),
+    "review": mark("Filter by review"),
 }
 
 
@@ -67,13 +80,13 @@ class DeformationTable(QWidget):
         self.menu = self._make_menu()
         self.show_columns(SHOWN_FIRST)
         self._make_filters()
-        self._empty = EmptyHint(WAITING)
+        self._empty = EmptyHint(tr(WAITING))
         self._lay_out()
         self.apply(self._state)
 
     def _make_view(self) -> QTableView:
         view = _Table()
-        view.setAccessibleName("Deformations")
+        view.setAccessibleName(tr("Deformations"))
         view.setModel(self.proxy)
         view.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         view.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -91,7 +104,7 @@ class DeformationTable(QWidget):
         header.setHighlightSections(False)
         header.setStretchLastSection(True)
         header.setSectionsMovable(True)
-        header.setToolTip("Click: sort. Drag: move. Right click: choose columns")
+        header.setToolTip(tr("Click: sort. Drag: move. Right click: choose columns"))
         # No column: the model's own order, which is by verdict, the deepest first.
         header.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
         header.setSortIndicatorClearable(True)
@@ -112,22 +125,24 @@ class DeformationTable(QWidget):
         menu = QMenu(self)
         self.decisions: dict[ReviewState, QAction] = {}
         for state, text in DECISIONS.items():
-            action = self.decisions[state] = menu.addAction(theme.icon(REVIEW_ICON[state]), text)
+            action = self.decisions[state] = menu.addAction(
+                theme.icon(REVIEW_ICON[state]), tr(text)
+            )
             action.triggered.connect(lambda _=False, state=state: self._decide(state))
         menu.addSeparator()
-        self._add_keyed(menu, "Copy rows", QKeySequence.StandardKey.Copy, self.copy)
+        self._add_keyed(menu, tr("Copy rows"), QKeySequence.StandardKey.Copy, self.copy)
         every = QKeySequence.StandardKey.SelectAll
-        self._add_keyed(menu, "Select all", every, self.view.selectAll)
+        self._add_keyed(menu, tr("Select all"), every, self.view.selectAll)
         menu.addSeparator()
-        self.column_menu = QMenu("Columns", self)
+        self.column_menu = QMenu(tr("Columns"), self)
         self.column_actions: dict[str, QAction] = {}
         for column in COLUMNS:
-            title = "Number" if column.title == "#" else column.title
+            title = tr("Number") if column.title == "#" else tr(column.title)
             action = self.column_actions[column.key] = self.column_menu.addAction(title)
             action.setCheckable(True)
             action.toggled.connect(lambda on, key=column.key: self._show_column(key, on))
         self.column_menu.addSeparator()
-        self.column_menu.addAction("As at first", self._reset_columns)
+        self.column_menu.addAction(tr("As at first"), self._reset_columns)
         menu.addMenu(self.column_menu)
         return menu
 
@@ -142,30 +157,27 @@ class DeformationTable(QWidget):
         menu.addAction(action)
 
     def _make_filters(self) -> None:
-        self.kind = self._filter_choice(
-            "kind", "All kinds", [(str(k), k, None) for k in DeformationKind]
-        )
-        verdicts = [(str(v), v, theme.verdict_icon(v)) for v in Verdict]
-        self.verdict = self._filter_choice("verdict", "All verdicts", verdicts)
-        states = [(str(s), s, theme.icon(REVIEW_ICON[s])) for s in ReviewState]
-        self.state = self._filter_choice("review", "Any review", states)
+        self.kind = self._filter_choice("kind", [(tr(k), k, None) for k in DeformationKind])
+        verdicts = [(tr(v), v, theme.verdict_icon(v)) for v in Verdict]
+        self.verdict = self._filter_choice("verdict", verdicts)
+        states = [(tr(s), s, theme.icon(REVIEW_ICON[s])) for s in ReviewState]
+        self.state = self._filter_choice("review", states)
         self.min_depth = QuietSpinBox()
-        self.min_depth.setAccessibleName("Filter by depth")
-        self.min_depth.setToolTip("Hide what is shallower")
+        self.min_depth.setAccessibleName(tr("Filter by depth"))
+        self.min_depth.setToolTip(tr("Hide what is shallower"))
         self.min_depth.setRange(0, 1000)
         self.min_depth.setPrefix("≥ ")
         self.min_depth.setSuffix(" mm")
-        self.min_depth.setSpecialValueText("any depth")
+        self.min_depth.setSpecialValueText(tr("any depth"))
         self.min_depth.valueChanged.connect(self._filter)
         self.counts = QLabel()
         self.counts.setProperty("muted", True)
 
-    def _filter_choice(
-        self, what: str, every: str, choices: Sequence[tuple[str, Any, Any]]
-    ) -> QuietComboBox:
+    def _filter_choice(self, what: str, choices: Sequence[tuple[str, Any, Any]]) -> QuietComboBox:
+        tip, every = map(tr, FILTERS[what])
         combo = QuietComboBox()
-        combo.setAccessibleName(f"Filter by {what}")
-        combo.setToolTip(f"Show only deformations of one {what}")
+        combo.setAccessibleName(tr(FILTER_NAMES[what]))
+        combo.setToolTip(tip)
         combo.addItem(every, None)
         for text, value, icon in choices:
             if icon is None:
@@ -207,7 +219,7 @@ class DeformationTable(QWidget):
             if is_new or state.selected != before.selected:
                 self._show_selected()
         self._stack.setCurrentWidget(self._table if self.model.rowCount() else self._empty)
-        found = "No deformations found: every pipe keeps its shape."
+        found = tr("No deformations found: every pipe keeps its shape.")
         self._empty.setText(found if state.result is not None else WAITING)
         self._count()
 
@@ -310,12 +322,15 @@ class DeformationTable(QWidget):
         rows = self._shown_rows()
         verdicts = Counter(self.model.deformation(r).verdict for r in rows)
         n_rows = self.model.rowCount()
-        parts = [f"{len(rows)} shown" if len(rows) == n_rows else f"{len(rows)} of {n_rows} shown"]
-        urgent = (Verdict.REJECT, Verdict.REVIEW)
-        parts += [f"{verdicts[verdict]} to {verdict}" for verdict in urgent if verdicts[verdict]]
+        parts = [
+            tr("{n} shown").format(n=len(rows))
+            if len(rows) == n_rows
+            else tr("{n} of {total} shown").format(n=len(rows), total=n_rows)
+        ]
+        parts += describe.to_do(verdicts)
         n_open = sum(self.model.review(r).state is ReviewState.OPEN for r in rows)
         if n_open < len(rows):
-            parts.append(f"{n_open} open")
+            parts.append(tr("{n} open").format(n=n_open))
         self.counts.setText(" · ".join(parts))
 
     # What the user does
@@ -365,7 +380,7 @@ class _ReviewChoice(QStyledItemDelegate):
         """Return a choice that opens at once and is done when something is chosen."""
         combo = QuietComboBox(parent)
         for state in ReviewState:
-            combo.addItem(theme.icon(REVIEW_ICON[state]), str(state), state)
+            combo.addItem(theme.icon(REVIEW_ICON[state]), tr(state), state)
         combo.activated.connect(lambda _: self.commitData.emit(combo))
         combo.activated.connect(lambda _: self.closeEditor.emit(combo))
         return combo
@@ -379,4 +394,4 @@ class _ReviewChoice(QStyledItemDelegate):
     def setModelData(self, editor: QWidget, model: Any, index: Any) -> None:  # noqa: N802
         """Hand over what was chosen."""
         assert isinstance(editor, QuietComboBox)
-        model.setData(index, editor.currentText())
+        model.setData(index, editor.currentData())

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipegui import theme
+from pipegui.texts import tr
 
 _ICONS = {
     "info": ("check-circle-outline", "accent"),
@@ -38,11 +39,11 @@ class MessageBar(QFrame):
         self.text.setWordWrap(True)
         self.text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.details_button = QToolButton()
-        self.details_button.setText("Details…")
+        self.details_button.setText(tr("Details…"))
         self.details_button.clicked.connect(self._show_details)
         self.close_button = QToolButton()
-        self.close_button.setAccessibleName("Close the message")
-        self.close_button.setToolTip("Close the message")
+        self.close_button.setAccessibleName(tr("Close the message"))
+        self.close_button.setToolTip(tr("Close the message"))
         self.close_button.clicked.connect(self.hide)
         self.answer_buttons: list[QToolButton] = []
         row = self._row = QHBoxLayout(self)
@@ -94,7 +95,7 @@ class MessageBar(QFrame):
         dialog = QDialog(self.window())
         dialog.setObjectName("details")
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.setWindowTitle("Details")
+        dialog.setWindowTitle(tr("Details"))
         dialog.resize(80 * theme.SPACING, 48 * theme.SPACING)
         message = QLabel(self.text.text())
         message.setWordWrap(True)
@@ -102,7 +103,7 @@ class MessageBar(QFrame):
         details.setReadOnly(True)
         details.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
-        copy = buttons.addButton("Copy", QDialogButtonBox.ButtonRole.ActionRole)
+        copy = buttons.addButton(tr("Copy"), QDialogButtonBox.ButtonRole.ActionRole)
         whole = f"{self.text.text()}\n\n{self._details}"
         copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(whole))
         buttons.rejected.connect(dialog.close)

@@ -16,8 +16,9 @@ from pipecore.settings import Settings
 from pipegui import theme
 from pipegui.panels.widgets import QuietComboBox
 from pipegui.presets import Preset, Presets
+from pipegui.texts import mark, tr
 
-NONE_OF_THEM = "Own settings"
+NONE_OF_THEM = mark("Own settings")
 TOOL_TIP = Qt.ItemDataRole.ToolTipRole
 
 
@@ -34,28 +35,28 @@ class PresetBar(QWidget):
         self._settings = Settings()
         self._listed: list[Preset] = []
         self.choice = QuietComboBox()
-        self.choice.setAccessibleName("Preset")
+        self.choice.setAccessibleName(tr("Preset"))
         self.choice.setSizeAdjustPolicy(
             QuietComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self.choice.setMinimumContentsLength(8)
         self.choice.activated.connect(self._choose)
-        self.save_button = _button("content-save-outline", "Keep these settings under a name")
+        self.save_button = _button("content-save-outline", tr("Keep these settings under a name"))
         self.save_button.clicked.connect(self._open)
-        self.delete_button = _button("trash-can-outline", "Delete this preset of your own")
+        self.delete_button = _button("trash-can-outline", tr("Delete this preset of your own"))
         self.delete_button.clicked.connect(self._delete)
         self.name = QLineEdit()
-        self.name.setAccessibleName("Name of the preset")
-        self.name.setPlaceholderText("Name")
+        self.name.setAccessibleName(tr("Name of the preset"))
+        self.name.setPlaceholderText(tr("Name"))
         self.name.textChanged.connect(self._check)
         self.name.returnPressed.connect(self._save)
-        self.accept = QPushButton("Save")
+        self.accept = QPushButton(tr("Save"))
         self.accept.clicked.connect(self._save)
-        cancel = QPushButton("Cancel")
+        cancel = QPushButton(tr("Cancel"))
         cancel.clicked.connect(self._close)
         self.objection = QLabel(wordWrap=True)
         self.objection.setProperty("muted", True)
-        label = QLabel("Preset")
+        label = QLabel(tr("Preset"))
         label.setBuddy(self.choice)
         top = QHBoxLayout()
         for widget in (label, self.choice, self.save_button, self.delete_button):
@@ -95,15 +96,15 @@ class PresetBar(QWidget):
         with QSignalBlocker(self.choice):
             self.choice.clear()
             for preset in self._listed:
-                self.choice.addItem(preset.name)
-                self.choice.setItemData(self.choice.count() - 1, preset.description, TOOL_TIP)
+                self.choice.addItem(preset.shown_name)
+                self.choice.setItemData(self.choice.count() - 1, tr(preset.description), TOOL_TIP)
             if present is None:
-                self.choice.addItem(NONE_OF_THEM)
+                self.choice.addItem(tr(NONE_OF_THEM))
             names = [preset.name for preset in self._listed]
             row = len(names) if present is None else names.index(present.name)
             self.choice.setCurrentIndex(row)
-        tip = "Settings kept by name. Length unit and own stacks stay as they are."
-        described = present.description if present else ""
+        tip = tr("Settings kept by name. Length unit and own stacks stay as they are.")
+        described = tr(present.description) if present else ""
         self.choice.setToolTip(f"{described}\n{tip}".strip())
         self.delete_button.setEnabled(present is not None and present.is_own)
 
@@ -134,7 +135,7 @@ class PresetBar(QWidget):
         objection = self._presets.objection(self.name.text())
         self.accept.setEnabled(not objection)
         own = {preset.name for preset in self._listed if preset.is_own}
-        self.accept.setText("Replace" if self.name.text().strip() in own else "Save")
+        self.accept.setText(tr("Replace") if self.name.text().strip() in own else tr("Save"))
         self.objection.setText(objection)
 
     def _save(self) -> None:
@@ -154,7 +155,9 @@ class PresetBar(QWidget):
         try:
             self._presets.delete(preset)
         except OSError as error:
-            self.failed.emit(f"“{preset.name}” was not deleted: {error}")
+            self.failed.emit(
+                tr("“{name}” was not deleted: {error}").format(name=preset.name, error=error)
+            )
         self._list()
 
 

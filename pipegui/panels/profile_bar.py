@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
 from pipegui import theme
 from pipegui.panels.widgets import Applying
+from pipegui.texts import tr
 from pipegui.view_state import ProfileBarState
 
 
@@ -26,20 +27,20 @@ class ProfileBar(QWidget):
         row.setSpacing(theme.SPACING)
         self.stack = QLabel()
         row.addWidget(self.stack)
-        self.previous = self._button("‹", "Previous profile (,)", -1)
+        self.previous = self._button("‹", tr("Previous profile (,)"), -1)
         row.addWidget(self.previous)
         self.slider = QSlider(Qt.Orientation.Horizontal)
-        self.slider.setAccessibleName("Profile of the stack")
-        self.slider.setToolTip("Which profile of the stack is shown")
+        self.slider.setAccessibleName(tr("Profile of the stack"))
+        self.slider.setToolTip(tr("Which profile of the stack is shown"))
         self.slider.valueChanged.connect(self._tell)
         row.addWidget(self.slider, 1)
-        self.next = self._button("›", "Next profile (.)", 1)
+        self.next = self._button("›", tr("Next profile (.)"), 1)
         row.addWidget(self.next)
         self.place = QLabel()
         row.addWidget(self.place)
         self.all = QToolButton()
-        self.all.setText("All")
-        self.all.setToolTip("Show all profiles of the stack")
+        self.all.setText(tr("All"))
+        self.all.setToolTip(tr("Show all profiles of the stack"))
         self.all.setCheckable(True)
         self.all.clicked.connect(lambda: self.chosen.emit(None))
         row.addWidget(self.all)
@@ -59,9 +60,11 @@ class ProfileBar(QWidget):
                 self.slider.setValue(int(np.searchsorted(state.indices, state.shown)))
         self.all.setChecked(state.shown is None)
         n = len(state.indices)
-        at = "" if state.shown is None else f"{self.slider.value() + 1} of "
+        at = "" if state.shown is None else tr("{n} of ").format(n=self.slider.value() + 1)
         # As wide as it can get: what stands beside it should not move.
-        self.place.setMinimumWidth(self.place.fontMetrics().horizontalAdvance(f"{n} of {n}"))
+        self.place.setMinimumWidth(
+            self.place.fontMetrics().horizontalAdvance(tr("{n} of {n}").format(n=n))
+        )
         self.place.setText(f"{at}{n}")
 
     def _button(self, text: str, tip: str, by: int) -> QToolButton:

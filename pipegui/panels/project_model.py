@@ -16,17 +16,17 @@ from PySide6.QtCore import (
 )
 from PySide6.QtGui import QFont, QIcon
 
-from pipecore.report.format import format_count, format_measure
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Deformation, Element, Result
 from pipegui import describe, theme
 from pipegui.document import Scan, Selection
+from pipegui.texts import count, first_capital, format_measure, label_of, mark, tr
 from pipegui.view_state import TreeState
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
 NAME, RADIUS, BADGE = range(3)
-HEADERS = ("Name", "r, mm", "")
+HEADERS = (mark("Name"), "r, mm", "")
 
 
 class NodeKind(Enum):
@@ -120,7 +120,7 @@ class ProjectModel(QAbstractItemModel):
             self._add_run(node, run_id, [e for e in result.elements if e.run_id == run_id], ranked)
         if ranked:
             branch = _Node(NodeKind.DEFORMATIONS, node, index)
-            branch.text, branch.icon = f"Deformations ({len(ranked)})", "target"
+            branch.text, branch.icon = tr("Deformations ({n})").format(n=len(ranked)), "target"
             self._add(branch)
             for deformation in ranked:
                 self._add_deformation(branch, deformation, result)
@@ -129,10 +129,10 @@ class ProjectModel(QAbstractItemModel):
         self, parent: _Node, run_id: int, elements: list[Element], ranked: list[Deformation]
     ) -> None:
         if len(elements) > 1:
-            text = f"Run {run_id} ({len(elements)})"
+            text = tr("Run {run_id} ({n})").format(run_id=run_id, n=len(elements))
             run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, text)
             run.icon, run.elements = "pipe-disconnected", tuple(e.element_id for e in elements)
-            run.hint = format_count(len(elements), "element")
+            run.hint = count("{n:,} element", "{n:,} elements", len(elements))
             parent = self._add(run)
         # An element that is a run of its own stands alone: one line less to open and to read.
         for element in elements:
@@ -143,19 +143,19 @@ class ProjectModel(QAbstractItemModel):
         self, parent: _Node, element: Element, deformations: tuple[Deformation, ...]
     ) -> None:
         node = _Node(NodeKind.ELEMENT, parent, parent.scan_index, element.element_id)
-        node.text, node.icon = element.label, theme.ELEMENT_ICON[element.kind]
+        node.text, node.icon = label_of(element), theme.ELEMENT_ICON[element.kind]
         radius_mm, sd_mm = 1000 * element.radius, 1000 * element.radius_sd
         node.radius = format_measure(radius_mm, decimals=1)
-        size = element.nominal.name if element.nominal else "no nominal size within tolerance"
-        node.hint = f"{element.label}: r {format_measure(radius_mm, sd_mm, 'mm')}, {size}"
+        size = element.nominal.name if element.nominal else tr("no nominal size within tolerance")
+        node.hint = f"{label_of(element)}: r {format_measure(radius_mm, sd_mm, 'mm')}, {size}"
         node.badge, node.elements = deformations, (element.element_id,)
         self._add(node)
 
     def _add_deformation(self, parent: _Node, deformation: Deformation, result: Result) -> None:
         element = result.element(deformation.element_id)
         node = _Node(NodeKind.DEFORMATION, parent, parent.scan_index, deformation.deformation_id)
-        name = f"{str(deformation.kind).capitalize()} {deformation.deformation_id}"
-        node.text = f"{name} · {element.label}"
+        name = describe.deformation_name(deformation)
+        node.text = f"{name} · {label_of(element)}"
         node.badge = (deformation,)
         self._add(node)
 
@@ -190,7 +190,7 @@ class ProjectModel(QAbstractItemModel):
     ) -> Any:
         """Return a column's title."""
         if orientation is Qt.Orientation.Horizontal and role == Role.DisplayRole:
-            return HEADERS[section]
+            return tr(HEADERS[section])
         return None
 
     def flags(self, index: Index) -> Qt.ItemFlag:
@@ -243,7 +243,7 @@ class ProjectModel(QAbstractItemModel):
 
     def _hint(self, node: _Node, column: int) -> str:
         if column == BADGE and node.kind is NodeKind.ELEMENT and node.badge:
-            return "\n".join(f"{str(d.kind).capitalize()}: {d.verdict}" for d in node.badge)
+            return "\n".join(f"{first_capital(tr(d.kind))}: {tr(d.verdict)}" for d in node.badge)
         return node.hint or node.text
 
     def _check_state(self, node: _Node) -> Qt.CheckState | None:

@@ -23,6 +23,7 @@ from pipegui import theme
 from pipegui.document import Selection
 from pipegui.panels.project_model import BADGE, NAME, RADIUS, NodeKind, ProjectModel
 from pipegui.panels.widgets import Applying, EmptyHint
+from pipegui.texts import tr
 from pipegui.view_state import TreeState
 
 __all__ = ["NodeKind", "ProjectTree"]
@@ -50,7 +51,7 @@ class ProjectTree(QWidget):
         self.model.visibility_changed.connect(self.visibility_changed)
         self.model.renamed.connect(self.renamed)
         self.view = QTreeView()
-        self.view.setAccessibleName("Project")
+        self.view.setAccessibleName(tr("Project"))
         self.view.setModel(self.model)
         self.view.setUniformRowHeights(True)
         self.view.setIconSize(theme.icon_size(2))
@@ -67,8 +68,8 @@ class ProjectTree(QWidget):
         self.view.customContextMenuRequested.connect(self._request_menu)
         self.view.selectionModel().selectionChanged.connect(self._tell)
         self.filter = QLineEdit()
-        self.filter.setPlaceholderText("Filter by name")
-        self.filter.setAccessibleName("Filter the project by name")
+        self.filter.setPlaceholderText(tr("Filter by name"))
+        self.filter.setAccessibleName(tr("Filter the project by name"))
         self.filter.setClearButtonEnabled(True)
         self.filter.textChanged.connect(self._filter)
         self._full = QWidget()
@@ -77,7 +78,7 @@ class ProjectTree(QWidget):
         full.setSpacing(theme.SPACING // 2)
         full.addWidget(self.filter)
         full.addWidget(self.view)
-        self._empty = EmptyHint("Scans, pipe runs and deformations appear here.")
+        self._empty = EmptyHint(tr("Scans, pipe runs and deformations appear here."))
         self._layout = QStackedLayout(self)
         self._layout.addWidget(self._empty)
         self._layout.addWidget(self._full)

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import (
 from pipegui import theme
 from pipegui.describe import Heading, properties
 from pipegui.panels.widgets import EmptyHint
+from pipegui.texts import tr
 from pipegui.view_state import PropertiesState
 
 
@@ -23,7 +24,7 @@ class PropertiesPanel(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.list = QTreeWidget()
-        self.list.setAccessibleName("Properties")
+        self.list.setAccessibleName(tr("Properties"))
         self.list.setColumnCount(2)
         self.list.setHeaderHidden(True)
         self.list.setRootIsDecorated(False)
@@ -32,13 +33,13 @@ class PropertiesPanel(QWidget):
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.list.header().setSectionResizeMode(0, QHeaderView.ResizeMode.ResizeToContents)
         self.list.header().setStretchLastSection(True)
-        copy = QAction(theme.icon("content-copy"), "Copy", self.list)
+        copy = QAction(theme.icon("content-copy"), tr("Copy"), self.list)
         copy.setShortcut(QKeySequence(QKeySequence.StandardKey.Copy))
         copy.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
         copy.triggered.connect(self.copy)
         self.list.addAction(copy)
         self.list.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-        self._empty = EmptyHint("Radius, size and position of what you select appear here.")
+        self._empty = EmptyHint(tr("Radius, size and position of what you select appear here."))
         self._layout = QStackedLayout(self)
         self._layout.addWidget(self._empty)
         self._layout.addWidget(self.list)

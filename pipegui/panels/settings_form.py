@@ -21,6 +21,7 @@ from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipegui import theme
 from pipegui.panels.preset_bar import PresetBar
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
+from pipegui.texts import mark, tr
 
 ELSEWHERE = {"stacks.preset", "stacks.directions"} | {
     key for key, spec in iterate_fields() if spec.group == "tiling"
@@ -28,13 +29,13 @@ ELSEWHERE = {"stacks.preset", "stacks.directions"} | {
 """Set in the stacks panel; or on the command line, for scans that the app cannot show whole."""
 
 GROUP_TITLES = {
-    "input": "File",
-    "thinning": "Thinning",
-    "stacks": "Stacks",
-    "profiles": "Profiles",
-    "ellipses": "Ellipses",
-    "elements": "Elements",
-    "deformation": "Deformations",
+    "input": mark("File"),
+    "thinning": mark("Thinning"),
+    "stacks": mark("Stacks"),
+    "profiles": mark("Profiles"),
+    "ellipses": mark("Ellipses"),
+    "elements": mark("Elements"),
+    "deformation": mark("Deformations"),
 }
 LARGEST = 1e6
 
@@ -50,7 +51,7 @@ class SettingsForm(QScrollArea):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setAccessibleName("Settings")
+        self.setAccessibleName(tr("Settings"))
         self.setWidgetResizable(True)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._applying = Applying()
@@ -66,12 +67,12 @@ class SettingsForm(QScrollArea):
         self.presets = PresetBar()
         column.addWidget(self.presets)
         self._add_groups(column, advanced=False)
-        self.advanced = _Fold("Advanced")
+        self.advanced = _Fold(tr("Advanced"))
         self._add_groups(self.advanced.content, advanced=True)
         column.addWidget(self.advanced)
         self.reset = QToolButton()
-        self.reset.setText("Reset to defaults")
-        self.reset.setToolTip("All settings back to the defaults; own stacks stay")
+        self.reset.setText(tr("Reset to defaults"))
+        self.reset.setToolTip(tr("All settings back to the defaults; own stacks stay"))
         self.reset.clicked.connect(self.reset_requested)
         column.addWidget(self.reset)
         column.addStretch()
@@ -87,17 +88,17 @@ class SettingsForm(QScrollArea):
             }
             if not specs:
                 continue
-            column.addLayout(self._heading(title, list(specs)))
+            column.addLayout(self._heading(tr(title), list(specs)))
             form = QFormLayout()
             form.setContentsMargins(0, 0, 0, theme.SPACING // 2)
             form.setSpacing(theme.SPACING // 2)
             form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
             for key, spec in specs.items():
-                label, field = QLabel(spec.label), self._field(key, spec)
+                label, field = QLabel(tr(spec.label)), self._field(key, spec)
                 label.setMinimumWidth(16 * theme.SPACING)
                 field.setMinimumWidth(10 * theme.SPACING)
                 field.setObjectName(key)
-                field.setAccessibleName(spec.label)
+                field.setAccessibleName(tr(spec.label))
                 label.setBuddy(field)
                 for widget in (label, field):
                     widget.setToolTip(_help(spec))
@@ -105,7 +106,7 @@ class SettingsForm(QScrollArea):
                 row = QHBoxLayout()
                 row.setSpacing(0)
                 row.addWidget(field, 1)
-                tip = f"Set “{spec.label}” back to its default"
+                tip = tr("Set “{label}” back to its default").format(label=tr(spec.label))
                 self._resets[key] = self._reset_button(tip, [key])
                 row.addWidget(self._resets[key])
                 form.addRow(label, row)
@@ -114,7 +115,9 @@ class SettingsForm(QScrollArea):
     def _heading(self, title: str, keys: list[str]) -> QHBoxLayout:
         heading = QLabel(title)
         heading.setProperty("heading", True)
-        button = self._reset_button(f"Set all of “{title}” back to the defaults", keys)
+        button = self._reset_button(
+            tr("Set all of “{title}” back to the defaults").format(title=title), keys
+        )
         self._group_resets.append((keys, button))
         row = QHBoxLayout()
         row.addWidget(heading, 1)
@@ -136,9 +139,9 @@ class SettingsForm(QScrollArea):
 
     def _field(self, key: str, spec: FieldSpec) -> QWidget:
         if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
-            return self._choice(key, [(str(value), value) for value in spec.kind])
+            return self._choice(key, [(tr(value), value) for value in spec.kind])
         if key == "deformation.rule":
-            return self._choice(key, [(rule.title, rule.name) for rule in list_rules()])
+            return self._choice(key, [(tr(rule.title), rule.name) for rule in list_rules()])
         if spec.kind is float:
             return self._number(key, spec)
         return self._text(key)
@@ -171,7 +174,7 @@ class SettingsForm(QScrollArea):
         if spec.unit:
             field.setSuffix(f" {spec.unit}" if spec.unit != "°" else "°")
         if spec.zero_means:
-            field.setSpecialValueText(spec.zero_means)
+            field.setSpecialValueText(tr(spec.zero_means))
         self._show[key] = field.setValue
         field.valueChanged.connect(lambda value: self._tell(key, value))
         return field
@@ -204,16 +207,16 @@ class SettingsForm(QScrollArea):
 
 
 def _help(spec: FieldSpec) -> str:
-    lines = [spec.help]
+    lines = [tr(spec.help)]
     unit = f" {spec.unit}" if spec.unit else ""
     if spec.minimum is not None and spec.maximum is not None:
         lines.append(f"{spec.minimum:g} … {spec.maximum:g}{unit}")
     elif spec.minimum is not None:
-        lines.append(f"at least {spec.minimum:g}{unit}")
-    default = spec.zero_means if spec.zero_means and spec.default == 0 else None
+        lines.append(tr("at least {minimum:g}{unit}").format(minimum=spec.minimum, unit=unit))
+    default = tr(spec.zero_means) if spec.zero_means and spec.default == 0 else None
     if default is None:
-        default = f"{spec.default:.4g}{unit}" if spec.kind is float else str(spec.default)
-    lines.append(f"Default: {default}")
+        default = f"{spec.default:.4g}{unit}" if spec.kind is float else tr(str(spec.default))
+    lines.append(tr("Default: {default}").format(default=default))
     return "\n".join(lines)
 
 

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QWi
 from pipecore.geometry import Array
 from pipegui import theme
 from pipegui.panels.widgets import QuietSpinBox
+from pipegui.texts import tr
 
 
 class StackEditor(QWidget):
@@ -24,38 +25,40 @@ class StackEditor(QWidget):
         """Tells where the 3D view looks; set by the window."""
         self.components = [self._component(name) for name in "XYZ"]
         self.width_mm = QuietSpinBox()
-        self.width_mm.setAccessibleName("Profile width")
-        self.width_mm.setToolTip("Thickness of this stack's profiles; 0 takes that of the settings")
+        self.width_mm.setAccessibleName(tr("Profile width"))
+        self.width_mm.setToolTip(
+            tr("Thickness of this stack's profiles; 0 takes that of the settings")
+        )
         self.width_mm.setRange(0, 1000)
         self.width_mm.setSuffix(" mm")
-        self.width_mm.setSpecialValueText("as in the settings")
+        self.width_mm.setSpecialValueText(tr("as in the settings"))
         self.title = QLabel()
         self.title.setObjectName("formTitle")
-        self.accept_button = QPushButton("Add")
+        self.accept_button = QPushButton(tr("Add"))
         self.accept_button.clicked.connect(self._accept)
-        cancel = QPushButton("Cancel")
+        cancel = QPushButton(tr("Cancel"))
         cancel.clicked.connect(self.hide)
         grid = QGridLayout(self)
         grid.setContentsMargins(theme.SPACING, 0, theme.SPACING, 0)
         grid.setSpacing(theme.SPACING // 2)
         grid.addWidget(self.title, 0, 0, 1, 4)
-        grid.addWidget(QLabel("Direction"), 1, 0)
-        grid.addWidget(QLabel("Width"), 3, 0)
+        grid.addWidget(QLabel(tr("Direction")), 1, 0)
+        grid.addWidget(QLabel(tr("Width")), 3, 0)
         for column, component in enumerate(self.components, start=1):
             grid.addWidget(component, 1, column)
             axis = np.eye(3)[column - 1]
             button = QPushButton("XYZ"[column - 1])
-            button.setToolTip(f"Along the {button.text()} axis")
+            button.setToolTip(tr("Along the {text} axis").format(text=button.text()))
             button.clicked.connect(lambda _=False, axis=axis: self._set(axis))
             grid.addWidget(button, 2, column)
             button.setMinimumWidth(5 * theme.SPACING)
-        self.from_view = QPushButton("View")
+        self.from_view = QPushButton(tr("View"))
         self.from_view.setMinimumWidth(7 * theme.SPACING)
-        self.from_view.setToolTip("The direction in which the 3D view looks")
+        self.from_view.setToolTip(tr("The direction in which the 3D view looks"))
         self.from_view.clicked.connect(self._take_view)
         grid.addWidget(self.from_view, 2, 0)
-        self.from_points = QPushButton("From two points")
-        self.from_points.setToolTip("Click two points in the 3D view, such as along a pipe")
+        self.from_points = QPushButton(tr("From two points"))
+        self.from_points.setToolTip(tr("Click two points in the 3D view, such as along a pipe"))
         self.from_points.clicked.connect(self._want_points)
         self.from_points.setMinimumWidth(1)
         grid.addWidget(self.from_points, 4, 1, 1, 3)
@@ -68,8 +71,10 @@ class StackEditor(QWidget):
 
     def _component(self, name: str) -> QuietSpinBox:
         field = QuietSpinBox()
-        field.setAccessibleName(f"Direction {name}")
-        field.setToolTip(f"{name} of the direction along which profiles follow one another")
+        field.setAccessibleName(tr("Direction {name}").format(name=name))
+        field.setToolTip(
+            tr("{name} of the direction along which profiles follow one another").format(name=name)
+        )
         field.setRange(-1, 1)
         field.setDecimals(3)
         field.setSingleStep(0.1)
@@ -80,12 +85,12 @@ class StackEditor(QWidget):
 
     def open(self, direction: tuple[float, ...], *, is_new: bool) -> None:
         """Show a stack to be edited."""
-        self.title.setText("New stack" if is_new else "Edit stack")
-        self.accept_button.setText("Add" if is_new else "Apply")
+        self.title.setText(tr("New stack") if is_new else tr("Edit stack"))
+        self.accept_button.setText(tr("Add") if is_new else tr("Apply"))
         self._set(np.array(direction[:3]))
         self.width_mm.setValue(direction[3] if len(direction) > 3 else 0.0)
         self.from_view.setVisible(self.view_direction is not None)
-        self.from_points.setText("From two points")
+        self.from_points.setText(tr("From two points"))
         self.show()
         self.components[0].setFocus()
 
@@ -98,12 +103,12 @@ class StackEditor(QWidget):
             self._set(np.round(self.view_direction(), 3))
 
     def _want_points(self) -> None:
-        self.from_points.setText("Click two points …")
+        self.from_points.setText(tr("Click two points …"))
         self.points_wanted.emit()
 
     def take_points(self, start: tuple[float, ...], end: tuple[float, ...] | None) -> None:
         """Take the direction from one point to another."""
-        self.from_points.setText("From two points")
+        self.from_points.setText(tr("From two points"))
         offset = np.subtract(end if end is not None else start, start)
         length = float(np.linalg.norm(offset))
         if length > 0:

@@ -25,20 +25,21 @@ from pipegui.panels.cutting_fields import CuttingFields
 from pipegui.panels.stack_editor import StackEditor
 from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
 from pipegui.plan_state import PlanState
+from pipegui.texts import mark, tr
 from pipegui.view_state import StacksState
 
 PRESET_TEXT = {
-    DirectionPreset.AUTOMATIC: "Automatic",
-    DirectionPreset.AXES: "X, Y and Z",
-    DirectionPreset.AXES_AND_DIAGONALS: "Axes and diagonals",
-    DirectionPreset.NONE: "Only my own",
+    DirectionPreset.AUTOMATIC: mark("Automatic"),
+    DirectionPreset.AXES: mark("X, Y and Z"),
+    DirectionPreset.AXES_AND_DIAGONALS: mark("Axes and diagonals"),
+    DirectionPreset.NONE: mark("Only my own"),
 }
 NAME, WIDTH, PROFILES, SHARE = range(4)
 HINTS = (
-    "Tick a stack that was cut to show its profiles in colour",
-    "Thickness of a profile",
-    "Before a detection: how many profiles would be cut. After it: how many show an ellipse.",
-    "Share of the surface that the stack cuts steeply enough to use, judged on a sample",
+    mark("Tick a stack that was cut to show its profiles in colour"),
+    mark("Thickness of a profile"),
+    mark("Before a detection: how many profiles would be cut. After it: how many show an ellipse."),
+    mark("Share of the surface that the stack cuts steeply enough to use, judged on a sample"),
 )
 CHECKED = Qt.CheckState.Checked
 OWN_INDEX = Qt.ItemDataRole.UserRole
@@ -73,10 +74,10 @@ class StacksPanel(QWidget):
         self._applying = Applying()
         self._own_directions: tuple[tuple[float, ...], ...] = ()
         self.preset = QuietComboBox()
-        self.preset.setAccessibleName("Directions")
-        self.preset.setToolTip("Directions in which stacks are cut besides your own")
+        self.preset.setAccessibleName(tr("Directions"))
+        self.preset.setToolTip(tr("Directions in which stacks are cut besides your own"))
         for preset, text in PRESET_TEXT.items():
-            self.preset.addItem(text, preset)
+            self.preset.addItem(tr(text), preset)
         self.preset.setSizeAdjustPolicy(
             QuietComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
@@ -85,10 +86,10 @@ class StacksPanel(QWidget):
         self.cutting = CuttingFields()
         self.cutting.changed.connect(self.setting_changed)
         self.list = QTreeWidget()
-        self.list.setAccessibleName("Stacks")
-        self.list.setHeaderLabels(["Stack", "Width", "Profiles", "Cut"])
+        self.list.setAccessibleName(tr("Stacks"))
+        self.list.setHeaderLabels([tr("Stack"), tr("Width"), tr("Profiles"), tr("Cut")])
         for column, hint in enumerate(HINTS):
-            self.list.headerItem().setToolTip(column, hint)
+            self.list.headerItem().setToolTip(column, tr(hint))
         self.list.setRootIsDecorated(False)
         self.list.setIndentation(0)
         self.list.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
@@ -101,10 +102,12 @@ class StacksPanel(QWidget):
         self.list.itemChanged.connect(self._tell_shown)
         self.list.currentItemChanged.connect(self._enable)
         self.list.itemActivated.connect(lambda *_: self._activate())
-        self.add_button = self._button("plus", "Add a stack", self.add)
-        self.remove_button = self._button("minus", "Remove the selected own stack", self.remove)
-        self.edit_button = self._button("pencil-outline", "Edit the selected own stack", self.edit)
-        tip = "Preview a profile of the selected stack with its curves"
+        self.add_button = self._button("plus", tr("Add a stack"), self.add)
+        self.remove_button = self._button("minus", tr("Remove the selected own stack"), self.remove)
+        self.edit_button = self._button(
+            "pencil-outline", tr("Edit the selected own stack"), self.edit
+        )
+        tip = tr("Preview a profile of the selected stack with its curves")
         self.preview_button = self._button("eye-outline", tip, self.preview)
         self.editor = StackEditor()
         self.editor.accepted.connect(self._accept)
@@ -114,7 +117,7 @@ class StacksPanel(QWidget):
         self.editor.hide()
         self._edited: int | None = None
         self._empty = EmptyHint(
-            "Open a scan to see in which directions it would be cut, and how well."
+            tr("Open a scan to see in which directions it would be cut, and how well.")
         )
         self._note = QLabel()
         self._note.setProperty("muted", True)
@@ -135,7 +138,7 @@ class StacksPanel(QWidget):
 
     def _lay_out(self) -> None:
         top = QHBoxLayout()
-        label = QLabel("Directions")
+        label = QLabel(tr("Directions"))
         label.setBuddy(self.preset)
         top.addWidget(label)
         top.addWidget(self.preset, 1)
@@ -213,7 +216,9 @@ class StacksPanel(QWidget):
         plan = self._plan.plan
         if plan is None or not np.isfinite(plan.share):
             return ""
-        return f"Together they cut {100 * plan.share:.0f} % of the surface well."
+        return tr("Together they cut {share:.0f} % of the surface well.").format(
+            share=100 * plan.share
+        )
 
     def _add_plan(self, own: dict[int, tuple[float, ...]]) -> None:
         """List the stacks of the plan; own ones are taken out of `own`."""
@@ -227,7 +232,12 @@ class StacksPanel(QWidget):
             font.setItalic(True)
             item.setFont(NAME, font)
             direction = ", ".join(f"{c:.3f}" for c in planned.stack.direction)
-            item.setToolTip(NAME, f"Direction {direction}\nWill be cut at the next detection.")
+            item.setToolTip(
+                NAME,
+                tr("Direction {direction}\nWill be cut at the next detection.").format(
+                    direction=direction
+                ),
+            )
 
     def _row_of_plan(self, stack: Stack) -> int | None:
         """Row of the planned stack that is like a cut one."""
@@ -243,7 +253,7 @@ class StacksPanel(QWidget):
         self, stack: Stack, n_profiles: str, own: int | None, row: int | None
     ) -> QTreeWidgetItem:
         item = QTreeWidgetItem(self.list)
-        item.setText(NAME, stack.name or f"Stack {stack.stack_id}")
+        item.setText(NAME, stack.name or tr("Stack {stack_id}").format(stack_id=stack.stack_id))
         item.setText(WIDTH, f"{1000 * stack.width:.0f} mm")
         item.setText(PROFILES, n_profiles)
         item.setData(NAME, OWN_INDEX, own)
@@ -260,17 +270,22 @@ class StacksPanel(QWidget):
         item.setCheckState(NAME, CHECKED if is_shown else Qt.CheckState.Unchecked)
         item.setData(NAME, STACK_ID, stack.stack_id)
         direction = ", ".join(f"{c:.3f}" for c in stack.direction)
-        item.setToolTip(NAME, f"Direction {direction}\nTick to show its profiles in colour.")
+        item.setToolTip(
+            NAME,
+            tr("Direction {direction}\nTick to show its profiles in colour.").format(
+                direction=direction
+            ),
+        )
 
     def _add_planned(self, index: int, direction: tuple[float, ...], default_mm: float) -> None:
         item = QTreeWidgetItem(self.list)
-        item.setText(NAME, "Own: " + ", ".join(f"{c:g}" for c in direction[:3]))
+        item.setText(NAME, tr("Own: ") + ", ".join(f"{c:g}" for c in direction[:3]))
         width_mm = direction[3] if len(direction) > 3 else default_mm
-        item.setText(WIDTH, f"{width_mm:g} mm" if width_mm else "auto")
+        item.setText(WIDTH, f"{width_mm:g} mm" if width_mm else tr("auto"))
         item.setText(PROFILES, "–")
         item.setTextAlignment(PROFILES, Qt.AlignmentFlag.AlignRight)
         item.setData(NAME, OWN_INDEX, index)
-        item.setToolTip(NAME, "Will be cut at the next detection.")
+        item.setToolTip(NAME, tr("Will be cut at the next detection."))
         font = item.font(NAME)
         font.setItalic(True)
         item.setFont(NAME, font)

@@ -4,6 +4,7 @@ from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QStatusBar, QToolButton, QWidget
 
 from pipegui import describe, theme
+from pipegui.texts import tr
 from pipegui.view_state import WindowState
 from pipegui.worker import Progressed
 
@@ -23,13 +24,13 @@ class StatusBar(QStatusBar):
         self._title = ""
         self.scan = QLabel()
         self.cursor_position = QLabel()
-        self.cursor_position.setAccessibleName("Coordinates under the cursor")
+        self.cursor_position.setAccessibleName(tr("Coordinates under the cursor"))
         self.job = QLabel()
         self.bar = QProgressBar()
         self.bar.setTextVisible(False)
         self.bar.setFixedWidth(16 * theme.SPACING)
         self.cancel = QToolButton()
-        self.cancel.setText("Cancel")
+        self.cancel.setText(tr("Cancel"))
         self.cancel.setAutoRaise(True)
         self.cancel.clicked.connect(self.cancel_requested)
         self._job_box = QWidget()
@@ -38,8 +39,8 @@ class StatusBar(QStatusBar):
         row.setSpacing(theme.SPACING)
         for widget in (self.job, self.bar, self.cancel):
             row.addWidget(widget)
-        self.warming = QLabel("Preparing the detection for this computer (once)…")
-        self.warming.setToolTip("You can work meanwhile; a detection started now takes longer.")
+        self.warming = QLabel(tr("Preparing the detection for this computer (once)…"))
+        self.warming.setToolTip(tr("You can work meanwhile; a detection started now takes longer."))
         self.warming.hide()
         self.addPermanentWidget(self.warming)
         self.addWidget(self.scan)
@@ -54,7 +55,7 @@ class StatusBar(QStatusBar):
     def apply(self, state: WindowState) -> None:
         """Show which scan is looked at."""
         if state.scan is None:
-            self.scan.setText("No scan open")
+            self.scan.setText(tr("No scan open"))
             self.cursor_position.clear()
             return
         cloud = state.scan.cloud
@@ -76,7 +77,7 @@ class StatusBar(QStatusBar):
             return
         self.bar.setRange(0, STEPS)
         self.bar.setValue(round(STEPS * event.fraction))
-        parts = [f"{self._title}: {event.stage} {100 * event.fraction:.0f} %"]
+        parts = [f"{self._title}: {tr(event.stage)} {100 * event.fraction:.0f} %"]
         if event.seconds_left is not None:
             parts.append(_time_left(event.seconds_left))
         self.job.setText(" · ".join(parts))
@@ -86,7 +87,9 @@ class StatusBar(QStatusBar):
         """Show that the work goes on though it says nothing, as when kernels are compiled."""
         self.bar.setRange(0, 0)
         self.job.setText(
-            f"{self.job.text().split(' · ')[0]} · working (the first run takes longer)"
+            tr("{job} · working (the first run takes longer)").format(
+                job=self.job.text().split(" · ")[0]
+            )
         )
 
     def show_beside(self, title: str) -> None:
@@ -100,7 +103,7 @@ class StatusBar(QStatusBar):
         """Answer a cancel at once, before the work has stopped."""
         if self._job_box.isVisible():
             self.cancel.setEnabled(False)
-            self.job.setText("Cancelling…")
+            self.job.setText(tr("Cancelling…"))
             self._silence.stop()
 
     def start_warming(self) -> None:
@@ -119,7 +122,7 @@ class StatusBar(QStatusBar):
 
 def _time_left(seconds: float) -> str:
     if seconds < 1:
-        return "almost done"
+        return tr("almost done")
     if seconds < 90:
-        return f"{seconds:.0f} s left"
-    return f"{seconds / 60:.0f} min left"
+        return tr("{seconds:.0f} s left").format(seconds=seconds)
+    return tr("{seconds:.0f} min left").format(seconds=seconds / 60)

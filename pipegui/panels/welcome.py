@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLay
 
 from pipecore.io import formats
 from pipegui import theme
+from pipegui.texts import tr
 
 
 class Welcome(QWidget):
@@ -21,24 +22,24 @@ class Welcome(QWidget):
         self._area.setObjectName("dropArea")
         self._area.setMaximumWidth(70 * theme.SPACING)
         self._icon = QLabel()
-        title = QLabel("Drop a laser scan here")
+        title = QLabel(tr("Drop a laser scan here"))
         font = title.font()
         font.setPointSizeF(1.5 * font.pointSizeF())
         title.setFont(font)
         endings = [f.endings[0].lstrip(".").upper() for f in formats()]
-        known = QLabel(", ".join(dict.fromkeys(endings)) + " and more")
+        known = QLabel(", ".join(dict.fromkeys(endings)) + tr(" and more"))
         explanation = QLabel(
-            "PipeGUI finds the pipes, measures their radii and shows where they are deformed."
+            tr("PipeGUI finds the pipes, measures their radii and shows where they are deformed.")
         )
         explanation.setWordWrap(True)
         for label in (known, explanation):
             label.setProperty("muted", True)
         for label in (self._icon, title, known, explanation):
             label.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.open_button = QPushButton("Open a scan")
+        self.open_button = QPushButton(tr("Open a scan"))
         self.open_button.setObjectName("primaryButton")
         self.open_button.clicked.connect(self.open_requested)
-        self.demo_button = QPushButton("Try the demo")
+        self.demo_button = QPushButton(tr("Try the demo"))
         self.demo_button.clicked.connect(self.demo_requested)
         buttons = QHBoxLayout()
         buttons.setSpacing(theme.SPACING)

@@ -17,9 +17,14 @@ from PySide6.QtWidgets import (
 
 from pipegui import theme
 from pipegui.plots.export import Table, png, to_csv, to_image, to_svg, to_tsv
+from pipegui.texts import mark, tr
 from pipegui.theme import SPACING
 
-SAVED_AS = {"png": "Save as PNG…", "svg": "Save as SVG…", "csv": "Save numbers as CSV…"}
+SAVED_AS = {
+    "png": mark("Save as PNG…"),
+    "svg": mark("Save as SVG…"),
+    "csv": mark("Save numbers as CSV…"),
+}
 """Endings of the files that every plot can be saved as."""
 
 
@@ -63,7 +68,7 @@ class Chart(QWidget):
         self._stack.addWidget(self.empty)
         self._stack.addWidget(filled)
         self.menu = self._make_menu()
-        self.menu_button = self.tool_button("Copy and save", "export-variant")
+        self.menu_button = self.tool_button(tr("Copy and save"), "export-variant")
         self.menu_button.setMenu(self.menu)
         self.menu_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.canvas.scene().sigMouseClicked.connect(self._open_menu)
@@ -133,11 +138,11 @@ class Chart(QWidget):
 
     def _make_menu(self) -> QMenu:
         menu = QMenu(self)
-        menu.addAction("Show all", self.fit)
+        menu.addAction(tr("Show all"), self.fit)
         menu.addSeparator()
         for text, shortcut, act in (
-            ("Copy numbers", QKeySequence(QKeySequence.StandardKey.Copy), self.copy_numbers),
-            ("Copy picture", QKeySequence("Ctrl+Shift+C"), self.copy_picture),
+            (tr("Copy numbers"), QKeySequence(QKeySequence.StandardKey.Copy), self.copy_numbers),
+            (tr("Copy picture"), QKeySequence("Ctrl+Shift+C"), self.copy_picture),
         ):
             action = QAction(text, self)
             action.setShortcut(shortcut)
@@ -147,7 +152,7 @@ class Chart(QWidget):
             menu.addAction(action)
         menu.addSeparator()
         for ending, text in SAVED_AS.items():
-            menu.addAction(text, lambda ending=ending: self.save_requested.emit(ending))
+            menu.addAction(tr(text), lambda ending=ending: self.save_requested.emit(ending))
         return menu
 
     def _open_menu(self, event: object) -> None:

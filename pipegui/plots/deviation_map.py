@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QGraphicsEllipseItem, QGraphicsRectItem, QWidget
 
 from pipecore.geometry import Array
-from pipecore.report.format import format_clock, format_measure
+from pipecore.report.format import format_clock
 from pipecore.types import Deformation, DeformationKind
 from pipegui import theme
 from pipegui.colour_maps import DEVIATION, deviation_colours
@@ -15,10 +15,11 @@ from pipegui.colours import VERDICT
 from pipegui.plots.chart import Chart
 from pipegui.plots.export import Table
 from pipegui.plots.unrolled import Unrolled, from_clock, unroll
+from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.theme import SPACING
 from pipegui.view_state import MapState
 
-EMPTY = "Select an element to see its surface unrolled."
+EMPTY = mark("Select an element to see its surface unrolled.")
 DEGREES = ((-180, "6:00"), (-90, "9:00"), (0, "12:00"), (90, "3:00"), (180, "6:00"))
 MARGIN_DEG = 190
 """The map ends at ± 180°; the rest is room for the labels there."""
@@ -36,14 +37,14 @@ class DeviationMap(Chart):
     """(chainage, clock) under the cursor, or None."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(EMPTY, parent)
+        super().__init__(tr(EMPTY), parent)
         self._state = MapState()
         self._map: Unrolled | None = None
         self.scale = ScaleStrip()
         self.header.addWidget(self.scale)
         self.header.addStretch(1)
         self.header.addWidget(self.menu_button)
-        self.plot = self.add_plot(0, "Clock", "Chainage, m")
+        self.plot = self.add_plot(0, tr("Clock"), tr("Chainage, m"))
         self.plot.getAxis("left").setTicks([DEGREES])
         self.plot.setYRange(-MARGIN_DEG, MARGIN_DEG, padding=0)
         self.plot.setLimits(yMin=-MARGIN_DEG, yMax=MARGIN_DEG)
@@ -55,7 +56,7 @@ class DeviationMap(Chart):
         self.plot.addItem(self._cursor, ignoreBounds=True)
         self.on_click(self._click)
         self.on_hover(self._hover)
-        self.setAccessibleName("Deviation map")
+        self.setAccessibleName(tr("Deviation map"))
 
     def apply(self, state: MapState) -> None:
         """Show `state`."""
@@ -66,7 +67,9 @@ class DeviationMap(Chart):
         element = state.element
         has_points = element is not None and bool(np.isfinite(state.deviation).any())
         self.empty.setText(
-            EMPTY if element is None else f"{element.label} has no points with a deviation."
+            tr(EMPTY)
+            if element is None
+            else tr("{label} has no points with a deviation.").format(label=label_of(element))
         )
         self.show_filled(has_points)
         self.scale.set_limit(state.limit_mm)
@@ -143,13 +146,13 @@ class DeviationMap(Chart):
     def heading(self) -> str:
         """What is unrolled, and what the colours mean."""
         element, limit = self._state.element, self._state.limit_mm
-        name = "" if element is None else element.label
+        name = "" if element is None else label_of(element)
         blue, red = (QColor(*DEVIATION[i].tolist()).name() for i in (0, -1))
         inward, outward = (f'<span style="color:{c}">■</span>' for c in (blue, red))
-        return (
-            f"<b>{name}</b> · deviation<br>{inward} {limit:g} mm inward … "
-            f"{outward} {limit:g} mm outward"
-        )
+        return tr(
+            "<b>{name}</b> · deviation<br>{inward} {limit:g} mm inward … {outward} "
+            "{limit:g} mm outward"
+        ).format(name=name, inward=inward, limit=limit, outward=outward)
 
     def numbers(self) -> Table:
         """The cells that hold points."""
@@ -213,11 +216,13 @@ class DeviationMap(Chart):
         place = f"{chainage:.3f} m · {format_clock(clock)}"
         n_points = int(self._map.n_points[cell])
         if not n_points:
-            return f"{place} · not scanned"
+            return tr("{place} · not scanned").format(place=place)
         value: Array = self._map.deviation_mm[cell]
-        side = "outward" if value > 0 else "inward"
+        side = tr("outward") if value > 0 else tr("inward")
         size = format_measure(abs(float(value)), unit="mm")
-        return f"{place} · {size} {side} · {n_points} points"
+        return tr("{place} · {size} {side} · {n_points} points").format(
+            place=place, size=size, side=side, n_points=n_points
+        )
 
 
 class ScaleStrip(QWidget):

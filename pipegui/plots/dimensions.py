@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipecore.geometry import Array
-from pipecore.report.format import NOT_MEASURABLE, format_clock, format_measure
+from pipecore.report.format import format_clock
 from pipecore.types import Profiles
 from pipegui.plots.exaggeration import deviations
 from pipegui.section_cut import Ellipse, SectionCut
+from pipegui.texts import format_measure, mark, tr
 
 TELLING = 3.0
 """A deviation is a dimension if it is this many times its standard deviation."""
@@ -32,7 +33,7 @@ class Dimension:
     @property
     def text(self) -> str:
         """Name and value."""
-        return f"{self.name} {self.value}"
+        return f"{tr(self.name)} {self.value}"
 
 
 def curve_points(cut: SectionCut) -> list[Array]:
@@ -74,7 +75,7 @@ def _depth(cut: SectionCut) -> list[Dimension]:
     if not abs(off[row]) > TELLING * sd[row]:
         return []
     foot = points[row] - off[row] * _away(points[row], cut.reference)
-    name = "Depth" if off[row] < 0 else "Height"
+    name = mark("Depth") if off[row] < 0 else mark("Height")
     ends = np.stack([foot, points[row]])
     return [Dimension(name, abs(float(off[row])), float(sd[row]), ends)]
 
@@ -100,7 +101,10 @@ def _away(place_uv: Array, reference: Ellipse) -> Array:
 def dimensions_text(profile: Profiles, cut: SectionCut) -> str:
     """Return what is measured of the section, as far as the scan carries it."""
     radius = format_measure(1000 * profile.radius[0], 1000 * profile.radius_sd[0], "mm")
-    parts = [f"Radius {radius}", f"arc seen {np.rad2deg(profile.arc[0]):.0f}°"]
+    parts = [
+        tr("Radius {radius}").format(radius=radius),
+        tr("arc seen {arc:.0f}°").format(arc=np.rad2deg(profile.arc[0])),
+    ]
     found = dimensions(cut)
     ovality = float(profile.ovality[0])
     if not any(d.name == "Dmax" for d in found):
@@ -110,14 +114,18 @@ def dimensions_text(profile: Profiles, cut: SectionCut) -> str:
                 value = 1000 * (2 * profile.radius[0] + side * half)
                 parts.append(f"{name} {format_measure(value, unit='mm')}")
         else:
-            parts.append(f"diameters {NOT_MEASURABLE}: too little arc")
+            parts.append(tr("diameters not measurable: too little arc"))
     for dimension in found:
         text = dimension.text
         if dimension.name in ("Depth", "Height"):
-            text += f" at {format_clock(clock_of(dimension.ends_uv[1], cut.reference))}"
+            text += tr(" at {clock}").format(
+                clock=format_clock(clock_of(dimension.ends_uv[1], cut.reference))
+            )
         parts.append(text)
     if np.isfinite(ovality):
-        parts.append(f"ovality {format_measure(100 * ovality, unit='%')}")
+        parts.append(
+            tr("ovality {ovality}").format(ovality=format_measure(100 * ovality, unit="%"))
+        )
     if cut.curve is None:
-        parts.append(f"no fitted curve: {cut.no_curve}")
+        parts.append(tr("no fitted curve: {no_curve}").format(no_curve=cut.no_curve))
     return " · ".join(parts)

@@ -9,7 +9,7 @@ from PySide6.QtGui import QColor, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
 from pipecore.geometry import Array
-from pipecore.report.format import cell, format_count
+from pipecore.report.format import cell
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.plan_state import PreviewState
@@ -18,11 +18,12 @@ from pipegui.plots.exaggeration import ellipse_points
 from pipegui.plots.export import Table
 from pipegui.plots.section_view import FAR, STEPS
 from pipegui.section_cut import Ellipse
+from pipegui.texts import count, mark, tr
 
 if TYPE_CHECKING:
     from pipecore.preview import ProfilePreview
 
-EMPTY = (
+EMPTY = mark(
     "Open a scan to see one of its profiles with its curves before you detect. "
     "Change width, gap and method in the stacks panel and watch what they do."
 )
@@ -44,22 +45,22 @@ class PreviewView(Chart):
     """Whether anybody looks: what nobody sees need not be cut."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(EMPTY, parent)
+        super().__init__(tr(EMPTY), parent)
         self._state = PreviewState()
         self._fitted: object = None
         self.stacks = QComboBox()
         self.stacks.setMinimumContentsLength(10)
-        self.stacks.setAccessibleName("Stack of the preview")
-        self.stacks.setToolTip("The stack of which a profile is shown")
+        self.stacks.setAccessibleName(tr("Stack of the preview"))
+        self.stacks.setToolTip(tr("The stack of which a profile is shown"))
         self.stacks.activated.connect(lambda row: self.chosen.emit(row, None))
-        self.back = self.tool_button("Previous profile (←)", "chevron-left")
-        self.ahead = self.tool_button("Next profile (→)", "chevron-right")
+        self.back = self.tool_button(tr("Previous profile (←)"), "chevron-left")
+        self.ahead = self.tool_button(tr("Next profile (→)"), "chevron-right")
         for button, step in ((self.back, -1), (self.ahead, 1)):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.clicked.connect(lambda _=False, step=step: self.step_requested.emit(step))
         self.place = QSlider(Qt.Orientation.Horizontal)
-        self.place.setAccessibleName("Profile")
-        self.place.setToolTip("Which profile of the stack")
+        self.place.setAccessibleName(tr("Profile"))
+        self.place.setToolTip(tr("Which profile of the stack"))
         self.place.setTracking(True)
         self.place.valueChanged.connect(self._slide)
         self.number = QLabel()
@@ -73,13 +74,13 @@ class PreviewView(Chart):
         self.summary = QLabel(wordWrap=True)
         self.canvas.parentWidget().layout().insertWidget(2, self.summary)
         self.on_hover(self._hover)
-        self.setAccessibleName("Preview")
+        self.setAccessibleName(tr("Preview"))
 
     def apply(self, state: PreviewState) -> None:
         """Show `state`."""
         self.is_new_theme()
         before, self._state = self._state, state
-        self.empty.setText(state.message or EMPTY)
+        self.empty.setText(state.message or tr(EMPTY))
         self.show_filled(state.plan is not None and bool(state.plan.stacks))
         if state.plan is None or not state.plan.stacks:
             self.plot.clear()
@@ -93,11 +94,13 @@ class PreviewView(Chart):
         with QSignalBlocker(self.place):
             self.place.setRange(planned.first, planned.last)
             self.place.setValue(state.index)
-        self.number.setText(f"{state.index - planned.first + 1} of {planned.n_profiles}")
+        self.number.setText(
+            tr("{n} of {total}").format(n=state.index - planned.first + 1, total=planned.n_profiles)
+        )
         self.back.setEnabled(state.index > planned.first)
         self.ahead.setEnabled(state.index < planned.last)
         if state.preview is None:
-            self.summary.setText("Cutting …")
+            self.summary.setText(tr("Cutting …"))
             return
         self.summary.setText(summary_of(state.preview))
         self._draw(state.preview)
@@ -142,7 +145,9 @@ class PreviewView(Chart):
 
     def heading(self) -> str:
         """Which profile it is."""
-        text = f"<b>{self.stacks.currentText()}</b> · profile {self.number.text()}"
+        text = tr("<b>{stack}</b> · profile {number}").format(
+            stack=self.stacks.currentText(), number=self.number.text()
+        )
         return f"{text}<br>{self.summary.text()}"
 
     def numbers(self) -> Table:
@@ -192,7 +197,11 @@ class PreviewView(Chart):
             if np.hypot(at.x() - centre[0], at.y() - centre[1]) < 1.1 * major:
                 radius = 1000 * float(preview.ellipses.radius[row])
                 arc = np.rad2deg(float(preview.ellipses.arc[row]))
-                self.readout.setText(f"radius {radius:.1f} mm · arc seen {arc:.0f}°")
+                self.readout.setText(
+                    tr("radius {radius:.1f} mm · arc seen {arc:.0f}°").format(
+                        radius=radius, arc=arc
+                    )
+                )
                 return
         self.readout.clear()
 
@@ -209,19 +218,21 @@ def upright(preview: "ProfilePreview") -> Array:
 def summary_of(preview: "ProfilePreview") -> str:
     """Say what was found in a profile."""
     if not preview.n_points:
-        return "This profile holds no points."
+        return tr("This profile holds no points.")
     parts = [
-        format_count(preview.n_points, "point"),
-        format_count(preview.n_curves, "curve"),
-        format_count(len(preview.ellipses), "ellipse"),
+        count("{n:,} point", "{n:,} points", preview.n_points),
+        count("{n:,} curve", "{n:,} curves", preview.n_curves),
+        count("{n:,} ellipse", "{n:,} ellipses", len(preview.ellipses)),
     ]
     radii = np.sort(1000 * preview.ellipses.radius)[::-1]
     named = ", ".join(f"{r:.0f}" for r in radii[:N_NAMED])
     if len(radii):
-        parts.append(f"radius {named}{' …' if len(radii) > N_NAMED else ''} mm")
+        parts.append(
+            tr("radius {radii} mm").format(radii=named + (" …" if len(radii) > N_NAMED else ""))
+        )
     loose = float(np.mean(preview.curve < 0)) if len(preview.curve) else 0.0
     if loose >= 0.005:
-        parts.append(f"{100 * loose:.0f} % of the points in no curve (grey)")
+        parts.append(tr("{loose:.0f} % of the points in no curve (grey)").format(loose=100 * loose))
     return " · ".join(parts)
 
 

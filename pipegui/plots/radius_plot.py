@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.geometry import Array
-from pipecore.report.format import format_measure
 from pipecore.types import Element, Profiles
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
@@ -24,23 +23,25 @@ from pipegui.plots.chart import Chart, faint, small
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import index_at, pattern_of
 from pipegui.plots.radius_curves import Curve, key_of, range_of, table_of
+from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.view_state import RadiusPlotState
 
-EMPTY = "Select an element to see its radius from profile to profile."
+EMPTY = mark("Select an element to see its radius from profile to profile.")
 CLICK_PX = 20
 SPACE = 4
 """Pixels between the plots."""
-X_AXES = {"Index": "Profile index", "Chainage": "Chainage, m"}
+NO_PROFILES = mark("{label} has no profiles with an accepted ellipse.")
+X_AXES = {mark("Index"): mark("Profile index"), mark("Chainage"): mark("Chainage, m")}
 SERIES = {
-    "semi_minor": "Semi-minor axis",
-    "free_radius": "Radius of the free circle",
-    "fitted": "Fitted pattern",
-    "band": "Scatter band",
-    "limit": "Limit of the rule",
-    "error_bars": "Error bars",
-    "centre": "Centre off the axis",
-    "ovality": "Ovality",
-    "difference": "As difference from the fitted radius",
+    "semi_minor": mark("Semi-minor axis"),
+    "free_radius": mark("Radius of the free circle"),
+    "fitted": mark("Fitted pattern"),
+    "band": mark("Scatter band"),
+    "limit": mark("Limit of the rule"),
+    "error_bars": mark("Error bars"),
+    "centre": mark("Centre off the axis"),
+    "ovality": mark("Ovality"),
+    "difference": mark("As difference from the fitted radius"),
 }
 """What can be shown, by name."""
 AT_FIRST = frozenset(SERIES) - {"free_radius", "difference"}
@@ -57,7 +58,7 @@ class RadiusPlot(Chart):
     pins_cleared = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(EMPTY, parent)
+        super().__init__(tr(EMPTY), parent)
         self._state = RadiusPlotState()
         self._curve: Curve | None = None
         self._pinned: list[Curve] = []
@@ -67,26 +68,29 @@ class RadiusPlot(Chart):
         self.ovality = self.add_plot(2, "%")
         self._titles = [
             self._inside_title(plot, text)
-            for plot, text in ((self.offset, "centre off the axis"), (self.ovality, "ovality"))
+            for plot, text in (
+                (self.offset, tr("centre off the axis")),
+                (self.ovality, tr("ovality")),
+            )
         ]
         for plot in (self.offset, self.ovality):
             plot.setXLink(self.radius)
         self.on_click(self._click)
         self.on_hover(self._hover)
-        self.setAccessibleName("Radius plot")
+        self.setAccessibleName(tr("Radius plot"))
 
     def _make_header(self) -> None:
         self.stacks = QComboBox()
         self.stacks.setMinimumContentsLength(10)
-        self.stacks.setAccessibleName("Stack")
-        self.stacks.setToolTip("The stack whose profiles are plotted")
+        self.stacks.setAccessibleName(tr("Stack"))
+        self.stacks.setToolTip(tr("The stack whose profiles are plotted"))
         self.stacks.activated.connect(self._choose_stack)
         self.x_axis = QComboBox()
-        self.x_axis.addItems(X_AXES)
-        self.x_axis.setAccessibleName("Plot against")
-        self.x_axis.setToolTip("What the profiles are plotted against")
+        self.x_axis.addItems([tr(name) for name in X_AXES])
+        self.x_axis.setAccessibleName(tr("Plot against"))
+        self.x_axis.setToolTip(tr("What the profiles are plotted against"))
         self.x_axis.currentIndexChanged.connect(self._change_axis)
-        self.pin = self.tool_button("Pin: keep this element in the plot", "pin-outline")
+        self.pin = self.tool_button(tr("Pin: keep this element in the plot"), "pin-outline")
         self.pin.setCheckable(True)
         self.pin.clicked.connect(lambda _: self.pin_toggled.emit())
         self.shown_menu = QMenu(self)
@@ -94,13 +98,13 @@ class RadiusPlot(Chart):
         for name, text in SERIES.items():
             if name in ("centre", "difference"):
                 self.shown_menu.addSeparator()
-            action = self.shown[name] = self.shown_menu.addAction(text)
+            action = self.shown[name] = self.shown_menu.addAction(tr(text))
             action.setCheckable(True)
             action.setChecked(name in AT_FIRST)
             action.toggled.connect(self._change_shown)
         self.shown_menu.addSeparator()
-        self.shown_menu.addAction("Take all pins off", self.pins_cleared.emit)
-        self.shown_button = self.tool_button("What is plotted", "tune-variant")
+        self.shown_menu.addAction(tr("Take all pins off"), self.pins_cleared.emit)
+        self.shown_button = self.tool_button(tr("What is plotted"), "tune-variant")
         self.shown_button.setMenu(self.shown_menu)
         self.shown_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.key = QLabel(wordWrap=True)
@@ -127,9 +131,9 @@ class RadiusPlot(Chart):
             return
         has_profiles = state.element is not None and len(state.shown) > 0
         self.empty.setText(
-            EMPTY
+            tr(EMPTY)
             if state.element is None
-            else f"{state.element.label} has no profiles with an accepted ellipse."
+            else tr(NO_PROFILES).format(label=label_of(state.element))
         )
         self.show_filled(has_profiles)
         self._fill_stacks(state)
@@ -234,10 +238,11 @@ class RadiusPlot(Chart):
             layout.setRowStretchFactor(row, (5 if row == 0 else 2) if is_wanted else 0)
             layout.setRowSpacing(row, SPACE if is_wanted else 0)
         lowest = [plot for plot, is_wanted in wanted.items() if is_wanted][-1]
+        title = tr(list(X_AXES.values())[self.x_axis.currentIndex()])
         for plot in wanted:
             axis = plot.getAxis("bottom")
             axis.setStyle(showValues=plot is lowest)
-            axis.setLabel(X_AXES[self.x_axis.currentText()] if plot is lowest else None)
+            axis.setLabel(title if plot is lowest else None)
             axis.showLabel(plot is lowest)
         for title in self._titles:
             title.setBrush(theme.colour("muted"))
@@ -271,7 +276,7 @@ class RadiusPlot(Chart):
             ends = self._x_at(ends, curve.profiles)
             for plot in self.plots():
                 drawing.draw_stretch(plot, ends, colour, is_selected=is_selected)
-            text = f"{deformation.kind} {format_measure(1000 * deformation.depth, unit='mm')}"
+            text = f"{tr(deformation.kind)} {format_measure(1000 * deformation.depth, unit='mm')}"
             font = small(self.font())
             drawing.draw_label(self.radius, float(ends.mean()), text, colour, font)
 
@@ -293,24 +298,26 @@ class RadiusPlot(Chart):
 
     def _describe(self, curve: Curve) -> None:
         pattern, data = curve.pattern, curve.colour
-        scatter = f"scatter ± {format_measure(pattern.spread, unit='mm', decimals=2)}"
+        spread = format_measure(pattern.spread, unit="mm", decimals=2)
+        scatter = tr("scatter ± {spread}").format(spread=spread)
         if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
-            scatter = f"median {format_measure(pattern.middle, decimals=2)}, {scatter}"
+            middle = format_measure(pattern.middle, decimals=2)
+            scatter = tr("median {middle}, {scatter}").format(middle=middle, scatter=scatter)
         parts = []
         if self.shows("semi_minor"):
-            name = "semi-minor axis" if not self._pinned else curve.element.label
+            name = tr("semi-minor axis") if not self._pinned else label_of(curve.element)
             parts.append(key_of("●", data, name))
-        parts += [key_of("●", c.colour, c.element.label) for c in self._pinned]
+        parts += [key_of("●", c.colour, label_of(c.element)) for c in self._pinned]
         if self.shows("free_radius"):
             violet = QColor(*QUALITATIVE[-1].tolist())
-            parts.append(key_of("◇", violet, "free circle"))
+            parts.append(key_of("◇", violet, tr("free circle")))
         if self.shows("fitted"):
-            parts.append(key_of("━", theme.colour("text"), "fitted"))
+            parts.append(key_of("━", theme.colour("text"), tr("fitted")))
         if self.shows("band"):
             parts.append(key_of("╍", data, "") + key_of("▒", faint(data, 1), scatter))
         limit = self._state.dent_limit
         if self.shows("limit") and limit is not None:
-            text = f"limit for dents {1000 * limit.depth:.1f} mm"
+            text = tr("limit for dents {depth:.1f} mm").format(depth=1000 * limit.depth)
             parts.append(key_of("╍", QColor(VERDICT["reject"]), text))
             self.key.setToolTip(limit.text)
         self.key.setText("&nbsp; ".join(parts))
@@ -348,7 +355,7 @@ class RadiusPlot(Chart):
     def heading(self) -> str:
         """Title and key of the picture."""
         element = self._state.element
-        name = "" if element is None else element.label
+        name = "" if element is None else label_of(element)
         return f"<b>{name}</b> · {self.stacks.currentText()}<br>{self.key.text()}"
 
     def numbers(self) -> Table:
@@ -384,9 +391,8 @@ class RadiusPlot(Chart):
         profiles = self._state.shown
         radius = format_measure(1000 * profiles.radius[row], 1000 * profiles.radius_sd[row], "mm")
         centre = format_measure(1000 * profiles.centre_deviation[row], unit="mm")
-        text = (
-            f"Profile {profiles.profile_index[row]} · {profiles.chainage[row]:.3f} m"
-            f" · radius {radius} · centre off {centre}"
-        )
+        index, chainage = profiles.profile_index[row], profiles.chainage[row]
+        text = tr("Profile {index} · {chainage:.3f} m · radius {radius} · centre off {centre}")
+        text = text.format(index=index, chainage=chainage, radius=radius, centre=centre)
         metrics = QFontMetrics(self.readout.font())
         return metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.readout.width())

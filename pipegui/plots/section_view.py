@@ -7,7 +7,7 @@ from PySide6.QtGui import QAction, QColor, QKeyEvent
 from PySide6.QtWidgets import QLabel, QMenu, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
-from pipecore.report.format import cell, format_measure
+from pipecore.report.format import cell
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.plots.chart import Chart, faint
@@ -15,9 +15,10 @@ from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensi
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
 from pipegui.plots.export import Table
 from pipegui.section_cut import Ellipse, SectionCut
+from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.view_state import SectionState
 
-EMPTY = "Select a profile to see its section: click a point of the radius plot or of the map."
+EMPTY = mark("Select a profile to see its section: click a point of the radius plot or of the map.")
 MAX_FACTOR = 20
 MAX_POINTS = 20_000
 HOVER_PX = 15
@@ -29,13 +30,13 @@ STEPS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Down: -1, Qt.Key.Key_Right: 1, Qt.Key.K
 FAR = {Qt.Key.Key_PageDown: -10, Qt.Key.Key_PageUp: 10, Qt.Key.Key_Home: -(10**6)}
 FAR |= {Qt.Key.Key_End: 10**6}
 LAYERS = {
-    "points": "Points",
-    "curve": "Fitted curve",
-    "ellipse": "Ellipse",
-    "reference": "Undeformed contour",
-    "nominal": "Nominal size",
-    "dimensions": "Dimensions",
-    "curvature": "Curvature",
+    "points": mark("Points"),
+    "curve": mark("Fitted curve"),
+    "ellipse": mark("Ellipse"),
+    "reference": mark("Undeformed contour"),
+    "nominal": mark("Nominal size"),
+    "dimensions": mark("Dimensions"),
+    "curvature": mark("Curvature"),
 }
 AT_FIRST = frozenset(LAYERS) - {"nominal"}
 
@@ -47,7 +48,7 @@ class SectionView(Chart):
     """How many profiles further: -1 or 1, or many."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(EMPTY, parent)
+        super().__init__(tr(EMPTY), parent)
         self._state = SectionState()
         self._make_header()
         self.plot = self.add_plot(0, "mm")
@@ -62,19 +63,19 @@ class SectionView(Chart):
         self.canvas.parentWidget().layout().insertWidget(2, self.dimensions)
         self.on_hover(self._hover)
         self.canvas.sigDeviceRangeChanged.connect(self._refit)
-        self.setAccessibleName("Section")
+        self.setAccessibleName(tr("Section"))
 
     def _make_header(self) -> None:
         self.title = QLabel()
-        self.back = self.tool_button("Previous profile (←)", "chevron-left")
-        self.ahead = self.tool_button("Next profile (→)", "chevron-right")
+        self.back = self.tool_button(tr("Previous profile (←)"), "chevron-left")
+        self.ahead = self.tool_button(tr("Next profile (→)"), "chevron-right")
         for button, step in ((self.back, -1), (self.ahead, 1)):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.clicked.connect(lambda _=False, step=step: self.step_requested.emit(step))
         self.factor = QSlider(Qt.Orientation.Horizontal, minimum=1, maximum=MAX_FACTOR)
         self.factor.setMaximumWidth(96)
-        self.factor.setAccessibleName("Exaggeration")
-        self.factor.setToolTip("Draws deviations from the undeformed contour larger")
+        self.factor.setAccessibleName(tr("Exaggeration"))
+        self.factor.setToolTip(tr("Draws deviations from the undeformed contour larger"))
         self.factor.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         self.factor.valueChanged.connect(self._redraw)
         self.factor_text = QLabel("1×")
@@ -82,11 +83,11 @@ class SectionView(Chart):
         self.layer_menu = QMenu(self)
         self.layers: dict[str, QAction] = {}
         for name, text in LAYERS.items():
-            action = self.layers[name] = self.layer_menu.addAction(text)
+            action = self.layers[name] = self.layer_menu.addAction(tr(text))
             action.setCheckable(True)
             action.setChecked(name in AT_FIRST)
             action.toggled.connect(self._redraw)
-        self.layer_button = self.tool_button("What is drawn", "tune-variant")
+        self.layer_button = self.tool_button(tr("What is drawn"), "tune-variant")
         self.layer_button.setMenu(self.layer_menu)
         self.layer_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         for widget in (self.back, self.title, self.ahead):
@@ -106,8 +107,14 @@ class SectionView(Chart):
                 plot.clear()
             return
         index, chainage = int(state.profile.profile_index[0]), float(state.profile.chainage[0])
-        self.title.setText(f"Profile {index} · {chainage:.3f} m")
-        self.title.setToolTip(f"{state.position} of {state.count} · {state.stack_name}")
+        self.title.setText(
+            tr("Profile {index} · {chainage:.3f} m").format(index=index, chainage=chainage)
+        )
+        self.title.setToolTip(
+            tr("{n} of {total} · {stack}").format(
+                n=state.position, total=state.count, stack=state.stack_name
+            )
+        )
         self.back.setEnabled(state.position > 1)
         self.ahead.setEnabled(state.position < state.count)
         self.dimensions.setText(dimensions_text(state.profile, state.cut))
@@ -271,7 +278,7 @@ class SectionView(Chart):
     def heading(self) -> str:
         """What section it is, and its dimensions."""
         element = self._state.element
-        name = "" if element is None else element.label
+        name = "" if element is None else label_of(element)
         return f"<b>{name}</b> · {self.title.text()}<br>{self.dimensions.text()}"
 
     def numbers(self) -> Table:
@@ -324,8 +331,10 @@ class SectionView(Chart):
         if away[nearest] > HOVER_PX:
             return ""
         value = float(deviations(cut.points_uv[nearest : nearest + 1], cut.reference)[0])
-        side = "outward" if value > 0 else "inward"
-        return f"{format_measure(abs(value), unit='mm')} {side} of the undeformed contour"
+        side = tr("outward") if value > 0 else tr("inward")
+        return tr("{value} {side} of the undeformed contour").format(
+            value=format_measure(abs(value), unit="mm"), side=side
+        )
 
 
 _MODIFIERS = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier

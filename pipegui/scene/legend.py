@@ -18,17 +18,18 @@ from pipegui.scene.colouring import (
     height_range,
     stack_of,
 )
+from pipegui.texts import first_capital, mark, tr
 
 Swatch = tuple[tuple[int, int, int], str]
 
 KIND_NAME = {
-    ElementKind.CYLINDER: "Pipe",
-    ElementKind.TORUS: "Bend",
-    ElementKind.CONE: "Reducer",
-    ElementKind.SPHERE: "Sphere",
-    ElementKind.FLANGE: "Flange",
-    ElementKind.TEE: "Tee",
-    ElementKind.OTHER: "Other",
+    ElementKind.CYLINDER: mark("Pipe"),
+    ElementKind.TORUS: mark("Bend"),
+    ElementKind.CONE: mark("Reducer"),
+    ElementKind.SPHERE: mark("Sphere"),
+    ElementKind.FLANGE: mark("Flange"),
+    ElementKind.TEE: mark("Tee"),
+    ElementKind.OTHER: mark("Other"),
 }
 
 
@@ -56,22 +57,22 @@ def make_legend(cloud: PointCloud, result: Result | None, view: ViewOptions) -> 
     """Return what the colours mean, or None where they speak for themselves."""
     colour_by = effective(view.colour_by, cloud, result)
     if colour_by is ColourBy.DEVIATION:
-        return Legend("Deviation, mm", DEVIATION, _deviation_ticks(view.deviation_limit_mm))
+        return Legend(tr("Deviation, mm"), DEVIATION, _deviation_ticks(view.deviation_limit_mm))
     if colour_by is ColourBy.HEIGHT:
         low, high = (h + float(cloud.origin[2]) for h in height_range(cloud))
         ticks = tuple((s, f"{low + s * (high - low):.2f}") for s in (0.0, 0.5, 1.0))
-        return Legend("Height, m", HEIGHT, ticks)
+        return Legend(tr("Height, m"), HEIGHT, ticks)
     if colour_by is ColourBy.INTENSITY:
-        return Legend("Intensity", INTENSITY, ((0.0, "low"), (1.0, "high")))
+        return Legend(tr("Intensity"), INTENSITY, ((0.0, tr("low")), (1.0, tr("high"))))
     return _result_legend(colour_by, result, view) if result is not None else None
 
 
 def _result_legend(colour_by: ColourBy, result: Result, view: ViewOptions) -> Legend | None:
     if colour_by is ColourBy.KIND:
         kinds = {e.kind for e in result.elements}
-        return Legend("Kind", swatches=tuple(_swatch(k) for k in KIND_COLOUR if k in kinds))
+        return Legend(tr("Kind"), swatches=tuple(_swatch(k) for k in KIND_COLOUR if k in kinds))
     if colour_by is ColourBy.VERDICT:
-        return Legend("Verdict", swatches=_verdict_swatches(result))
+        return Legend(tr("Verdict"), swatches=_verdict_swatches(result))
     if colour_by is ColourBy.PROFILE:
         return _profile_legend(result, view)
     return None
@@ -88,26 +89,31 @@ def _deviation_ticks(limit_mm: float) -> tuple[tuple[float, str], ...]:
 
 def _swatch(kind: ElementKind) -> Swatch:
     red, green, blue = KIND_COLOUR[kind].tolist()
-    return (red, green, blue), KIND_NAME[kind]
+    return (red, green, blue), tr(KIND_NAME[kind])
 
 
 def _verdict_swatches(result: Result) -> tuple[Swatch, ...]:
     given = {d.verdict for d in result.deformations}
-    colours = [(rgb(VERDICT[v]), str(v).capitalize()) for v in VERDICT if v in given]
-    return (*reversed(colours), (SOUND, "No deformation"))
+    colours = [(rgb(VERDICT[v]), first_capital(tr(v))) for v in VERDICT if v in given]
+    return (*reversed(colours), (SOUND, tr("No deformation")))
 
 
 def _profile_legend(result: Result, view: ViewOptions) -> Legend:
     stack = stack_of(result, view.shown_stack)
     if stack is None:
-        return Legend("No stack is shown: tick one in the stacks panel.")
+        return Legend(tr("No stack is shown: tick one in the stacks panel."))
     if view.shown_profile is not None:
         return Legend(
-            f"One profile of {stack.name or f'stack {stack.stack_id}'}",
-            swatches=((NO_ELEMENT, "of no element"),),
+            tr("One profile of {stack}").format(
+                stack=stack.name or tr("stack {stack_id}").format(stack_id=stack.stack_id)
+            ),
+            swatches=((NO_ELEMENT, tr("of no element")),),
         )
     even, odd = (tuple(c) for c in PROFILE_COLOURS.tolist())
     return Legend(
-        f"{stack.name or f'Stack {stack.stack_id}'}, {1000 * stack.width:.0f} mm wide",
-        swatches=((even, "even profiles"), (odd, "odd profiles")),
+        tr("{stack}, {width:.0f} mm wide").format(
+            stack=stack.name or tr("Stack {stack_id}").format(stack_id=stack.stack_id),
+            width=1000 * stack.width,
+        ),
+        swatches=((even, tr("even profiles")), (odd, tr("odd profiles"))),
     )

@@ -12,6 +12,7 @@ from pipegui.describe import axis_names, coordinate_lines
 from pipegui.document import Measurement
 from pipegui.scene.label_places import place_box
 from pipegui.scene.projection import Projection
+from pipegui.texts import tr
 from pipegui.theme import SPACING
 
 CROSS = 10
@@ -44,7 +45,11 @@ def lines_of(measurement: Measurement, cloud: PointCloud) -> tuple[str, ...]:
     step = np.array(measurement.end) - start
     flat = float(np.hypot(step[0], step[1]))
     parts = [f"Δ{name} {_signed(v)}" for name, v in zip(axis_names(cloud), step, strict=True)]
-    return f"{np.linalg.norm(step):.3f} m", "  ".join(parts), f"horizontal {flat:.3f} m"
+    return (
+        f"{np.linalg.norm(step):.3f} m",
+        "  ".join(parts),
+        tr("horizontal {flat:.3f} m").format(flat=flat),
+    )
 
 
 def _signed(metres: float) -> str:

@@ -9,7 +9,6 @@ from PySide6.QtGui import QColor, QIcon, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QWidget
 
 from pipecore.geometry import Array
-from pipecore.report.format import format_measure
 from pipecore.types import Deformation, DeformationKind
 from pipegui import theme
 from pipegui.colours import VERDICT
@@ -18,6 +17,7 @@ from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
 from pipegui.scene.projection import Projection
+from pipegui.texts import first_capital, format_measure, tr
 from pipegui.theme import SPACING
 
 ICON = 16
@@ -60,7 +60,7 @@ def label_of(deformation: Deformation, *, is_selected: bool) -> Label:
         size = format_measure(1000 * deformation.depth, 1000 * deformation.depth_sd, "mm")
     return Label(
         deformation.deformation_id,
-        f"{str(deformation.kind).capitalize()} {size}",
+        f"{first_capital(tr(deformation.kind))} {size}",
         theme.verdict_icon(deformation.verdict),
         QColor(VERDICT[deformation.verdict]),
         np.asarray(deformation.peak, np.float64),

@@ -26,6 +26,7 @@ from pipegui.scene.overlay import Overlay, label_of
 from pipegui.scene.picking import warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
+from pipegui.texts import mark, tr
 from pipegui.view_state import SceneState
 
 BACKGROUND = {
@@ -37,8 +38,11 @@ BACKGROUND = {
 """Bottom and top."""
 HINTS = {
     Tool.SELECT: ("", ""),
-    Tool.MEASURE: ("Click the first point · Esc ends", "Click the second point · Esc ends"),
-    Tool.COORDINATES: ("Click a point: its coordinates are copied · Esc ends", ""),
+    Tool.MEASURE: (
+        mark("Click the first point · Esc ends"),
+        mark("Click the second point · Esc ends"),
+    ),
+    Tool.COORDINATES: (mark("Click a point: its coordinates are copied · Esc ends"), ""),
 }
 """Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
@@ -85,7 +89,7 @@ class SceneView(QWidget):
         self.canvas.hovered.connect(self._wait_for_hover)
         self.canvas.left.connect(self._stop_hovering)
         self.canvas.before_frame.connect(self._prepare_frame)
-        self.setAccessibleName("3D view")
+        self.setAccessibleName(tr("3D view"))
         self._warming = threading.Thread(target=warm_up, name="warm up picking", daemon=True)
         self._warming.start()
 
@@ -131,7 +135,7 @@ class SceneView(QWidget):
         is_selecting = state.view.tool is Tool.SELECT
         shape = Qt.CursorShape.ArrowCursor if is_selecting else Qt.CursorShape.CrossCursor
         self.canvas.setCursor(shape)
-        self.overlay.hint = HINTS[state.view.tool][state.view.measuring_from is not None]
+        self.overlay.hint = tr(HINTS[state.view.tool][state.view.measuring_from is not None])
         self._update_marks()
 
     def _update_marks(self) -> None:

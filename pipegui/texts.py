@@ -1,0 +1,88 @@
+"""What the window says, in the language that was chosen. Qt-free.
+
+Texts stand in the code in English; `tr` looks their translation up when they are shown, `mark`
+marks those of tables for it. Numbers keep the decimal point in every language, so that they
+can be compared with the tables of a report.
+"""
+
+import gettext
+from typing import Any
+
+from pipecore.report.format import NOT_MEASURABLE
+from pipecore.report.format import format_measure as _format_measure
+from pipecore.resources import resource
+from pipecore.types import Element
+
+LANGUAGES = {"": "As the system", "en": "English", "de": "Deutsch"}
+"""Names of the languages by their codes, each in its own; "" is the system's."""
+DOMAIN = "pipegui"
+KEEPS_CAPITALS = ("de",)
+"""Languages that write nouns with a capital within a sentence too."""
+
+
+class _Chosen:
+    """The language in use; the tests and the library speak English."""
+
+    code = "en"
+    catalogue: gettext.NullTranslations = gettext.NullTranslations()
+
+
+def use_language(chosen: str, system: str = "") -> None:
+    """Speak a language from now on: the chosen one, else the system's (such as "de-AT")."""
+    code = chosen or system[:2].lower()
+    _Chosen.code = code if code in LANGUAGES and code else "en"
+    _Chosen.catalogue = gettext.NullTranslations()
+    if _Chosen.code != "en":
+        _Chosen.catalogue = gettext.translation(DOMAIN, resource("locale"), [_Chosen.code])
+
+
+def language() -> str:
+    """Return the code of the language in use."""
+    return _Chosen.code
+
+
+def mark(text: str) -> str:
+    """Mark a text for translation that is looked up only where it is shown."""
+    return text
+
+
+def tr(text: str) -> str:
+    """Return a text in the language in use."""
+    return _Chosen.catalogue.gettext(text) if text else ""
+
+
+def trn(singular: str, plural: str, number: int) -> str:
+    """Return the form of a text that goes with a number."""
+    return _Chosen.catalogue.ngettext(singular, plural, number)
+
+
+def count(singular: str, plural: str, number: int) -> str:
+    """Return a counted noun, such as "1,204 points", from two forms with "{n:,}"."""
+    return trn(singular, plural, number).format(n=number)
+
+
+def plain_title(title: str) -> str:
+    """Return the title of a menu without the mark of its key."""
+    return title.replace("&", "")
+
+
+def inside(text: str) -> str:
+    """Return a name as it is written within a sentence."""
+    return text if _Chosen.code in KEEPS_CAPITALS else text[:1].lower() + text[1:]
+
+
+def first_capital(text: str) -> str:
+    """Return a text as it is written at the start of a line."""
+    return text[:1].upper() + text[1:]
+
+
+def label_of(element: Element) -> str:
+    """What an element is called: its own name, else such as "Pipe 3"."""
+    kind = element.label.removesuffix(f" {element.element_id}")
+    return element.name or f"{tr(kind)} {element.element_id}"
+
+
+def format_measure(*args: Any, **options: Any) -> str:
+    """Return a number with its uncertainty and unit as the reports do, or why there is none."""
+    text = _format_measure(*args, **options)
+    return tr(text) if text == NOT_MEASURABLE else text

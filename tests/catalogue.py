@@ -1,0 +1,128 @@
+"""The catalogues of translations: `python -m tests.catalogue` brings them up to the sources.
+
+Texts are found where the code calls `tr`, `mark`, `trn` and `count`; those of tables that the
+core or the menus hold are taken from the tables themselves.
+"""
+
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+
+from babel.messages.catalog import Catalog
+from babel.messages.extract import extract_from_dir
+from babel.messages.mofile import write_mo
+from babel.messages.pofile import read_po, write_po
+
+from pipecore.io import file_filter
+from pipecore.pipeline import STAGES
+from pipecore.report.format import NOT_MEASURABLE
+from pipecore.resources import resource
+from pipecore.rules import list_rules
+from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
+from pipecore.types import DeformationKind, ElementKind, ReviewState, Verdict
+from pipegui import theme
+from pipegui.actions import MENUS, SPECS
+from pipegui.document import Background, ColourBy
+from pipegui.presets import Presets
+from pipegui.texts import DOMAIN, LANGUAGES
+
+SOURCES = Path(__file__).parents[1] / "pipegui"
+KEYWORDS = {"tr": None, "mark": None, "trn": (1, 2), "count": (1, 2)}
+MORE_STAGES = ("reading", "normals", "drawing figures", "writing result")
+"""Stages of work that is no detection."""
+
+
+def tables() -> Iterator[str]:
+    """Yield the texts of tables that are translated where they are shown."""
+    yield from MENUS
+    for action in SPECS:
+        if action.name.startswith("language_") and action.name != "language_system":
+            yield from (action.tip, action.submenu)
+        else:
+            yield from (action.text, action.tip, action.submenu)
+    for _, spec in iterate_fields():
+        yield from (spec.label, spec.help, spec.zero_means)
+    for enum in (
+        ColourBy,
+        Background,
+        theme.Appearance,
+        ProfileMethod,
+        EllipseFit,
+        DirectionPreset,
+    ):
+        yield from (str(value) for value in enum)
+    for enum in (ElementKind, DeformationKind, Verdict, ReviewState):
+        yield from (str(value) for value in enum)
+    yield from (element_kind_name(kind) for kind in ElementKind)
+    yield from (rule.title for rule in list_rules())
+    for preset in Presets(Path("none")).every():
+        yield from (preset.name, preset.description)
+    yield from (*STAGES, *MORE_STAGES, NOT_MEASURABLE)
+    for kind in file_filter().split(";;"):
+        name = kind.partition(" (")[0]
+        if name in ("Point clouds", "All files"):
+            yield name
+
+
+def element_kind_name(kind: ElementKind) -> str:
+    """What the core calls an element of a kind that has no name of its own."""
+    from pipecore import types
+
+    return types._SPOKEN_KIND[kind]
+
+
+def extract() -> Catalog:
+    """Return a catalogue of all texts, untranslated, in a steady order."""
+    found = Catalog(charset="utf-8", fuzzy=False)
+    for _, _, text, _, _ in sorted(
+        extract_from_dir(SOURCES, [("**.py", "python")], keywords=KEYWORDS), key=lambda m: m[:2]
+    ):
+        found.add(text)
+    for text in tables():
+        if text:
+            found.add(text)
+    return found
+
+
+def path_of(code: str, ending: str = "po") -> Path:
+    """Path of a language's catalogue."""
+    return resource("locale", code, "LC_MESSAGES", f"{DOMAIN}.{ending}")
+
+
+def read(code: str) -> Catalog:
+    """Return a language's catalogue as it is kept."""
+    with path_of(code).open("rb") as file:
+        return read_po(file, locale=code)
+
+
+def compiled(catalogue: Catalog) -> bytes:
+    """Return what the program reads of a catalogue."""
+    buffer = BytesIO()
+    write_mo(buffer, catalogue)
+    return buffer.getvalue()
+
+
+def renew(code: str) -> None:
+    """Bring a language's catalogue up to the sources and compile it."""
+    catalogue = read(code)
+    catalogue.update(extract(), no_fuzzy_matching=True, update_creation_date=False)
+    catalogue.obsolete.clear()
+    with path_of(code).open("wb") as file:
+        write_po(file, catalogue, width=100, no_location=True, sort_output=False)
+    path_of(code, "mo").write_bytes(compiled(catalogue))
+    missing = [m.id for m in catalogue if m.id and not is_translated(m)]
+    print(f"{code}: {len(catalogue)} texts, {len(missing)} without a translation")
+    for text in missing:
+        print(f"  {text}")
+
+
+def is_translated(message: object) -> bool:
+    """Whether a message has all its forms."""
+    string = message.string
+    return all(string) if isinstance(string, tuple | list) else bool(string)
+
+
+if __name__ == "__main__":
+    for language in LANGUAGES:
+        if language not in ("", "en"):
+            renew(language)
