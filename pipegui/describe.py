@@ -242,7 +242,7 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
     if element.kind is ElementKind.CONE:
         yield _measure(tr("Radius at end"), element.radius_end, element.radius_sd)
     if element.nominal is not None:
-        od = f"OD {1000 * element.nominal.outside_diameter:.1f} mm"
+        od = tr("OD {od:.1f} mm").format(od=1000 * element.nominal.outside_diameter)
         yield Property(tr("Nominal size"), f"{element.nominal.name} ({od})", element.nominal.name)
     else:
         yield Property(tr("Nominal size"), tr("none within tolerance"))

@@ -116,7 +116,10 @@ class Edits:
         _, result, [element_id] = self._targets()
         element = result.element(element_id)
         sizes = sizes_of(str(result.settings.elements.catalogue))
-        names = [tr(NO_SIZE), *(f"{s.name} · OD {1000 * s.outside_diameter:.1f} mm" for s in sizes)]
+        names = [tr(NO_SIZE)]
+        for s in sizes:
+            od = tr("OD {od:.1f} mm").format(od=1000 * s.outside_diameter)
+            names.append(f"{s.name} · {od}")
         nearest = min(sizes, key=lambda s: abs(s.outside_diameter - 2 * element.radius))
         here = 1 + sizes.index(element.nominal if element.nominal in sizes else nearest)
         measured = format_measure(2000 * element.radius, 2000 * element.radius_sd, "mm")

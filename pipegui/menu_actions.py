@@ -168,7 +168,7 @@ class MenuActions:
         what = plot.accessibleName()
         selected = describe.title(self._window.document.result, self._window.document.selection)
         name = f"{self._stem()} {selected.replace(' · ', ' ')} {what.lower()}.{ending}"
-        names = {"png": tr("Pictures (*.png)"), "svg": tr("Drawings (*.svg)"), "csv": CSV}
+        names = {"png": tr("Pictures (*.png)"), "svg": tr("Drawings (*.svg)"), "csv": tr(CSV)}
 
         def write(path: Path) -> None:
             with pipecore.io.write_file(path) as temporary:

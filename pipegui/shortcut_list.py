@@ -58,7 +58,7 @@ class ShortcutList(QDialog):
         }
         groups |= {
             tr("In the panel: {name}").format(name=tr(name)): [
-                (tr(key), tr(what)) for key, what in keys
+                (_key(key), tr(what)) for key, what in keys
             ]
             for name, keys in IN_PANELS.items()
         }
@@ -91,6 +91,10 @@ class ShortcutList(QDialog):
 
 def _text(shortcut: QKeySequence) -> str:
     return shortcut.toString(QKeySequence.SequenceFormat.NativeText)
+
+
+def _key(key: str) -> str:
+    return _text(QKeySequence(key)) if "+" in key else tr(key)
 
 
 def _group(title: str, keys: list[tuple[str, str]]) -> QWidget:

@@ -179,7 +179,7 @@ COLUMNS = (
     ),
     _number(
         "depth_pct_od",
-        "% OD",
+        mark("% OD"),
         lambda r: 100 * r.deformation.depth / outside_diameter(r.element),
         1,
         mark("Depth in percent of the outside diameter"),

@@ -220,7 +220,7 @@ class DeformationTable(QWidget):
                 self._show_selected()
         self._stack.setCurrentWidget(self._table if self.model.rowCount() else self._empty)
         found = tr("No deformations found: every pipe keeps its shape.")
-        self._empty.setText(found if state.result is not None else WAITING)
+        self._empty.setText(found if state.result is not None else tr(WAITING))
         self._count()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: N802

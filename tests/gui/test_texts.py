@@ -156,6 +156,24 @@ def reader(known):
     return lambda text: text in plain or any(p.fullmatch(text) for p in patterns)
 
 
+def english_in(window):
+    """Texts of the catalogue that a window says in English, with where."""
+    kept = [pair for m in catalogue.read("de") if m.id for pair in forms(m)]
+    is_english, is_german = (reader([pair[i] for pair in kept]) for i in (0, 1))
+    left = []
+    for place, text in said(window):
+        for line in (text, *str(text).splitlines()):
+            plain = re.sub(r" \([^()]*\)$", "", str(line)).replace("&", "").strip()
+            if is_english(plain) and not is_german(plain):
+                left.append(f"{type(place).__name__} {place.objectName()}: {line}")
+    return sorted(set(left))
+
+
+@pytest.mark.usefixtures("german")
+def test_that_the_empty_window_is_german_too(make_window):
+    assert not english_in(make_window())
+
+
 @pytest.mark.usefixtures("german")
 def test_that_nothing_english_is_left_in_the_german_window(make_window):
     from pipegui.plots.deviation_map import DeviationMap
@@ -172,15 +190,7 @@ def test_that_nothing_english_is_left_in_the_german_window(make_window):
     window.do(commands.open_scan, Scan("plant.laz", cloud))
     window.take_result(cloud, result)
     window.do(view_commands.clip_to_scan)
-    kept = [pair for m in catalogue.read("de") if m.id for pair in forms(m)]
-    is_english, is_german = (reader([pair[i] for pair in kept]) for i in (0, 1))
-    left = []
-    for place, text in said(window):
-        for line in (text, *str(text).splitlines()):
-            plain = re.sub(r" \([^()]*\)$", "", str(line)).replace("&", "").strip()
-            if is_english(plain) and not is_german(plain):
-                left.append(f"{type(place).__name__} {place.objectName()}: {line}")
-    assert not left, "\n".join(sorted(set(left)))
+    assert not english_in(window)
     assert window.actions_["undo"].text() == "Rückgängig: Erkennen"
     assert window.panels.docks["Deformations"].windowTitle() == "Verformungen"
     assert window.panels.message.text.text().startswith("5 Rohre in 3 Rohrsträngen, 4 Verform")
