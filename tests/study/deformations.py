@@ -36,7 +36,7 @@ def write(quick: bool) -> str:
         for i, s in enumerate(_seeds("line", n // 12))
     ]
     clean = [Pipe(s, None).row() for s in _seeds("clean", n // 4)]
-    plants = [clean_plant(s) for s in _seeds("plant", 1 if quick else 2)]
+    plants = [clean_plant(s) for s in _seeds("plant", 1 if quick else 8)]
     pipes = [*patches, *ovals, *lines, *clean]
     few = " These are few: `--quick`." if quick else ""
     seen = [r for r in patches if r["seen"] >= FULLY_SEEN]
