@@ -30,7 +30,7 @@ def write(quick: bool) -> str:
     n = 24 if quick else 192
     cycle = (DeformationKind.DENT, DeformationKind.DENT, DeformationKind.BULGE)
     patches = [Pipe(s, cycle[i % 3]).row() for i, s in enumerate(_seeds("patch", n))]
-    ovals = [Pipe(s, DeformationKind.OVALITY).row() for s in _seeds("oval", n // 6)]
+    ovals = [Pipe(s, DeformationKind.OVALITY).row() for s in _seeds("oval", n // 2)]
     lines = [
         Pipe(s, (DeformationKind.BOW, DeformationKind.KINK)[i % 2]).row()
         for i, s in enumerate(_seeds("line", n // 12))
