@@ -301,4 +301,6 @@ def test_that_a_dent_whose_bottom_is_not_seen_has_no_depth(rng):
         assert np.isnan(dent.volume)
         assert dent.not_measurable["depth"] == "too few points at its peak"
     (whole,) = find(scan).deformations
-    assert whole.depth == pytest.approx(0.02, rel=0.1)
+    # Seen whole it is measured; its form is open, which its uncertainty tells.
+    assert abs(whole.depth - 0.02) < 5 * whole.depth_sd
+    assert whole.depth_sd < 0.004
