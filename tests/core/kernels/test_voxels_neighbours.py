@@ -226,7 +226,7 @@ def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):
 
 
 def test_that_sums_are_those_of_the_points_within_reach(rng):
-    xyz, p, reach = rng.uniform(0, 1, (50, 3)), np.array([0.4, 0.5, 0.6]), 0.4
+    xyz, p, reach = rng.uniform(0, 1, (200, 3)), np.array([0.4, 0.5, 0.6]), 0.4
     near = xyz[np.linalg.norm(xyz - p, axis=1) <= reach] - p
     n, *sums = neighbours.sums_within(*xyz.T.copy(), *p, reach**2)
     assert n == len(near) > 5
