@@ -1,0 +1,161 @@
+"""All settings of a detection: one frozen dataclass of small groups.
+
+Each field carries its label, unit, help and bounds in its metadata; the command
+line, the TOML file and the app's form are generated from it.
+"""
+
+import dataclasses
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import tomli_w
+
+from pipecore.errors import SettingsError
+from pipecore.settings.fields import FieldSpec, check, convert
+from pipecore.settings.groups import (
+    DeformationSettings,
+    DirectionPreset,
+    ElementSettings,
+    EllipseFit,
+    EllipseSettings,
+    InputSettings,
+    LengthUnit,
+    ProfileMethod,
+    ProfileSettings,
+    SizeCatalogue,
+    StackSettings,
+    ThinningSettings,
+    TilingSettings,
+)
+
+__all__ = [
+    "DeformationSettings",
+    "DirectionPreset",
+    "ElementSettings",
+    "EllipseFit",
+    "EllipseSettings",
+    "FieldSpec",
+    "InputSettings",
+    "LengthUnit",
+    "ProfileMethod",
+    "ProfileSettings",
+    "Settings",
+    "SizeCatalogue",
+    "StackSettings",
+    "ThinningSettings",
+    "TilingSettings",
+    "iterate_fields",
+]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings of a detection. Immutable; see `replace`.
+
+    Raises
+    ------
+    SettingsError
+        From any constructor, if a value is of the wrong kind or outside its bounds.
+    """
+
+    input: InputSettings = InputSettings()
+    thinning: ThinningSettings = ThinningSettings()
+    stacks: StackSettings = StackSettings()
+    profiles: ProfileSettings = ProfileSettings()
+    ellipses: EllipseSettings = EllipseSettings()
+    elements: ElementSettings = ElementSettings()
+    deformation: DeformationSettings = DeformationSettings()
+    tiling: TilingSettings = TilingSettings()
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        for key, spec in iterate_fields():
+            check(key, self.get(key), spec)
+
+    def get(self, key: str) -> Any:
+        """Return a value by its dotted key, such as "stacks.width_mm"."""
+        group, name = key.split(".")
+        return getattr(getattr(self, group), name)
+
+    def replace(self, changes: Mapping[str, Any]) -> "Settings":
+        """Return settings with some values changed, by dotted key; text is converted.
+
+        Raises
+        ------
+        SettingsError
+            If a key is unknown or a value does not fit.
+        """
+        grouped: dict[str, dict[str, Any]] = {}
+        specs = dict(iterate_fields())
+        for key, value in changes.items():
+            if key not in specs:
+                raise SettingsError(f"There is no setting “{key}”.")
+            group, name = key.split(".")
+            grouped.setdefault(group, {})[name] = convert(key, value, specs[key])
+        return dataclasses.replace(
+            self,
+            **{g: dataclasses.replace(getattr(self, g), **kw) for g, kw in grouped.items()},
+        )
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Return plain nested dicts of numbers, strings and lists."""
+        result: dict[str, dict[str, Any]] = {}
+        for key, _ in iterate_fields():
+            group, name = key.split(".")
+            value = self.get(key)
+            if isinstance(value, tuple):
+                value = [list(v) for v in value]
+            result.setdefault(group, {})[name] = str(value) if isinstance(value, StrEnum) else value
+        return result
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> "Settings":
+        """Return settings from nested dicts; what is absent keeps its default.
+
+        Raises
+        ------
+        SettingsError
+            If a key is unknown or a value does not fit.
+        """
+        changes = {}
+        for group, values in data.items():
+            if not isinstance(values, Mapping):
+                raise SettingsError(f"“{group}” is not a group of settings.")
+            changes.update({f"{group}.{name}": value for name, value in values.items()})
+        return cls().replace(changes)
+
+    def to_toml(self) -> str:
+        """Return the settings as TOML text."""
+        return tomli_w.dumps(self.to_dict())
+
+    @classmethod
+    def from_toml(cls, path: Path) -> "Settings":
+        """Read settings from a TOML file.
+
+        Raises
+        ------
+        SettingsError
+            If the file cannot be read or a key or value does not fit.
+        """
+        try:
+            data = tomllib.loads(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise SettingsError(f"Cannot read the settings file {path}: {error}.") from error
+        try:
+            return cls.from_dict(data)
+        except SettingsError as error:
+            raise SettingsError(f"{path}: {error}") from error
+
+
+def iterate_fields() -> Iterator[tuple[str, FieldSpec]]:
+    """Yield (dotted key, spec) of every setting, in order."""
+    groups = get_type_hints(Settings)
+    for group in dataclasses.fields(Settings):
+        kinds = get_type_hints(groups[group.name])
+        for f in dataclasses.fields(groups[group.name]):
+            spec = FieldSpec(group.name, f.name, kinds[f.name], f.default, **f.metadata)
+            yield f"{group.name}.{f.name}", spec

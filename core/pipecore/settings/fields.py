@@ -1,0 +1,123 @@
+"""How a setting is declared, and how a value for it is converted and checked."""
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from pipecore.errors import SettingsError
+
+
+def setting(
+    default: Any,
+    label: str,
+    help_text: str,
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    zero_means: str = "",
+    advanced: bool = False,
+) -> Any:
+    """Declare a field of a settings group.
+
+    Parameters
+    ----------
+    default : Any
+    label : str
+        What a form calls it.
+    help_text : str
+        One sentence for its tooltip and its flag.
+    unit : str
+        Shown beside the value.
+    minimum, maximum : float, optional
+        Inclusive bounds.
+    zero_means : str
+        What the value 0 stands for, such as "automatic"; "" if it is a plain number.
+    advanced : bool
+        Whether a form folds it away.
+    """
+    return field(
+        default=default,
+        metadata={
+            "label": label,
+            "help": help_text,
+            "unit": unit,
+            "minimum": minimum,
+            "maximum": maximum,
+            "zero_means": zero_means,
+            "advanced": advanced,
+        },
+    )
+
+
+@dataclass(frozen=True)
+class FieldSpec:
+    """What a form or a flag needs to know of one setting."""
+
+    group: str
+    name: str
+    kind: Any
+    default: Any
+    label: str
+    help: str
+    unit: str
+    minimum: float | None
+    maximum: float | None
+    zero_means: str
+    advanced: bool
+
+
+def convert(key: str, value: Any, spec: FieldSpec) -> Any:
+    """Turn text (from a flag) or plain TOML values into the field's type.
+
+    Raises
+    ------
+    SettingsError
+        If it cannot be.
+    """
+    try:
+        if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
+            return spec.kind(value)
+        if spec.kind is float and not isinstance(value, bool):
+            return float(value)
+        if spec.kind is str and isinstance(value, str):
+            return value
+        if key == "stacks.directions":
+            if isinstance(value, str):
+                value = [vector.split(",") for vector in value.split(";") if vector.strip()]
+            return tuple(tuple(float(c) for c in vector) for vector in value)
+    except (ValueError, TypeError):
+        pass
+    raise SettingsError(f"“{value}” does not fit the setting “{key}”{_expected(spec)}.")
+
+
+def _expected(spec: FieldSpec) -> str:
+    if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
+        return " (one of: " + ", ".join(spec.kind) + ")"
+    return " (a number)" if spec.kind is float else ""
+
+
+def check(key: str, value: Any, spec: FieldSpec) -> None:
+    """Raise SettingsError unless a value is of the field's type and within its bounds."""
+    if spec.kind is float:
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not math.isfinite(value):
+            raise SettingsError(f"The setting “{key}” must be a number, not {value!r}.")
+        if spec.minimum is not None and value < spec.minimum:
+            raise SettingsError(
+                f"The setting “{key}” is {value:g}; it must be at least {spec.minimum:g}."
+            )
+        if spec.maximum is not None and value > spec.maximum:
+            raise SettingsError(
+                f"The setting “{key}” is {value:g}; it must be at most {spec.maximum:g}."
+            )
+    elif key == "stacks.directions":
+        for vector in value:
+            usable = len(vector) in (3, 4) and all(map(math.isfinite, vector))
+            if not usable or not any(vector[:3]) or vector[3:] < (0.0,) * len(vector[3:]):
+                raise SettingsError(
+                    f"The stack {list(vector)} is not a direction x, y, z with an optional width."
+                )
+    elif not isinstance(value, spec.kind):
+        raise SettingsError(f"{value!r} does not fit the setting “{key}”{_expected(spec)}.")
