@@ -6,12 +6,13 @@ at an angle leave one unknown: the rounder the corner, the earlier the bend begi
 before it must agree with the straights and points in it with the torus, for one bend radius.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import bends as kernels
 from pipecore.elements.extent import Extent, find_extent, section_misfit
 from pipecore.elements.fittings import End, StraightEnd, straight_ends
 from pipecore.elements.nearby import NearbyPoints
@@ -39,7 +40,8 @@ OVERSHOOT = 1.5
 """A straight may have been followed this many radii into the bend."""
 N_STEPS = 6
 """Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
-MIN_POINTS = 15
+MIN_POINTS, LEAST_ON_BEND = 15, 12
+"""Points that a bend is fitted to, and those for which one is tried."""
 MAX_POINTS = 20_000
 FREE_SD = 0.015
 """A bend whose own points carry its bend radius to this share needs no straights for it."""
@@ -93,9 +95,16 @@ class Corner:
 
 
 def find_corners(
-    fitted: list[Fitted], nearby: NearbyPoints
+    fitted: list[Fitted], nearby: NearbyPoints, check: Callable[[], None] = lambda: None
 ) -> Iterator[tuple[Corner, float, tuple[End, End]]]:
     """Find pairs of straight ends that a bend may join, those with most points on it first.
+
+    Parameters
+    ----------
+    fitted : list of Fitted
+    nearby : NearbyPoints
+    check : callable
+        Called now and then; may raise to cancel.
 
     Yields
     ------
@@ -104,13 +113,29 @@ def find_corners(
     """
     ends = straight_ends(fitted)
     found = []
-    for a, one in enumerate(ends):
-        for other in ends[a + 1 :]:
-            between = corner_between(fitted, one, other, nearby)
-            if between is not None:
-                found.append((*between, (one.which, other.which)))
+    for a, b in _may_meet(ends):
+        check()
+        between = corner_between(fitted, ends[a], ends[b], nearby)
+        if between is not None:
+            found.append((*between, (ends[a].which, ends[b].which)))
     for _, corner, bend_radius, pair in sorted(found, key=lambda x: (-x[0], x[3])):
         yield corner, bend_radius, pair
+
+
+def _may_meet(ends: list[StraightEnd]) -> Iterator[tuple[int, int]]:
+    """Pairs of ends of one radius that are no further apart than a bend reaches."""
+    if not ends:
+        return
+    point, radius = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
+    # From an end to the corner, there and on to the other, and what the axes may miss by.
+    furthest = 2.0 * BEND_RADII[-1] * np.tan(MAX_TURN / 2) * (1.0 + SAME_RADIUS) * radius
+    furthest += 2.0 * MAX_SKEW * radius + 0.01
+    for a in range(len(ends) - 1):
+        smaller = np.minimum(radius[a], radius[a + 1 :])
+        is_one_size = np.abs(radius[a] - radius[a + 1 :]) <= SAME_RADIUS * smaller
+        is_near = np.square(point[a + 1 :] - point[a]).sum(axis=1) < furthest[a] ** 2
+        for b in (np.flatnonzero(is_one_size & is_near) + a + 1).tolist():
+            yield a, b
 
 
 def corner_between(
@@ -167,16 +192,20 @@ def _best_bend_radius(corner: Corner, gap: float, nearby: NearbyPoints) -> tuple
     ball = nearby.within_ball(corner.place, tangent_max + 1.2 * radius)
     xyz, normals = nearby.surface.xyz[ball], nearby.surface.normals[ball]
     tolerance = max(3.0 * nearby.surface.noise, 0.03 * radius)
-    best: tuple[int, float] | None = None
-    for bend_radius in map(float, BEND_RADII * radius):
-        if bend_radius * corner.half_tangent > tangent_max:
-            break
-        residual, _, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
-        on = np.abs(residual) < tolerance
-        on &= np.abs(np.einsum("ij,ij->i", normals, outward)) > RADIAL_COS
-        if (on & in_bend).sum() >= 12 and (best is None or on.sum() > best[0]):
-            best = int(on.sum()), bend_radius
-    return best
+    tried = BEND_RADII * radius
+    tried = tried[tried * corner.half_tangent <= tangent_max]
+    if len(tried) == 0:
+        return None
+    counts = np.empty((len(tried), 2), np.int64)
+    kernels.agreement(
+        xyz, normals,
+        np.stack([corner.surface(b, radius).numbers() for b in map(float, tried)]),
+        np.stack([LineSurface(corner.place, t, radius).numbers() for t in corner.towards]),
+        tried * corner.half_tangent, tolerance, RADIAL_COS, counts,
+    )  # fmt: skip
+    counts = np.where(counts[:, 1] >= LEAST_ON_BEND, counts[:, 0], -1)
+    best = int(np.argmax(counts))
+    return None if counts[best] < 0 else (int(counts[best]), float(tried[best]))
 
 
 def pipe_residuals(

@@ -34,10 +34,10 @@ class StraightEnd(NamedTuple):
     radius: float
 
 
-def straight_ends(fitted: list[Fitted]) -> list[StraightEnd]:
-    """Ends of the cylinders."""
+def straight_ends(fitted: list[Fitted], first: int = 0) -> list[StraightEnd]:
+    """Ends of the cylinders, from the piece with the number `first` on."""
     ends = []
-    for i, f in enumerate(fitted):
+    for i, f in enumerate(fitted[first:], start=first):
         if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered:
             direction, radius = f.fit.model.direction, f.fit.model.radius
             ends.append(StraightEnd((i, 0), f.axis.start, -direction, radius))
@@ -48,8 +48,14 @@ def straight_ends(fitted: list[Fitted]) -> list[StraightEnd]:
 def propose_reducers(fitted: list[Fitted]) -> Iterator[tuple[Piece, tuple[End, End]]]:
     """Cones between straights on one line but of different radii."""
     ends = straight_ends(fitted)
+    if not ends:
+        return
+    points, radii = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
     for a, (i, p, u, r) in enumerate(ends):
-        for j, q, v, s in ends[a + 1 :]:
+        furthest = 1.1 * MAX_REDUCER * np.maximum(r, radii[a + 1 :])
+        is_near = np.square(points[a + 1 :] - p).sum(axis=1) < furthest**2
+        for b in (np.flatnonzero(is_near) + a + 1).tolist():
+            j, q, v, s = ends[b]
             wide, narrow = max(r, s), min(r, s)
             if i[0] == j[0] or -(u @ v) < np.cos(np.deg2rad(6.0)) or not 0.4 < narrow / wide < 0.96:
                 continue

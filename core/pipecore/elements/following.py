@@ -5,12 +5,12 @@ seen beyond the bend has none. But a bend begins where a straight ends, along it
 and with its radius: only the plane in which it turns, its radius and its place are unknown.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import bends as kernels
 from pipecore.elements.fittings import NO_ELLIPSES, StraightEnd
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_angles
@@ -64,6 +64,16 @@ class _View:
         on &= (angle > 0) & (angle < min(MAX_ANGLE, AHEAD / bend_radius))
         return on, angle
 
+    def best_of(
+        self, starts: Array, bend_radii: Array, azimuths: Array, tolerance: float
+    ) -> tuple[int, float, float, float]:
+        """The bend that most points are on: how many, its start, bend radius and azimuth."""
+        count, i, j, k = kernels.best_follower(
+            self.place, self.normal, starts, bend_radii, np.cos(azimuths), np.sin(azimuths),
+            tolerance, RADIAL_COS, MAX_ANGLE, AHEAD,
+        )  # fmt: skip
+        return int(count), float(starts[i]), float(bend_radii[j]), float(azimuths[k])
+
     def straight_on(self, tolerance: float) -> int:
         """How many points are on the straight if it goes on."""
         s, a, b = self.place
@@ -104,23 +114,22 @@ def follow_end(
     rows = np.flatnonzero(near)
     if len(rows) > MAX_POINTS:
         rows = rows[np.linspace(0, len(rows) - 1, MAX_POINTS).astype(np.intp)]
-    view = _View(place[:, rows], frame @ nearby.surface.normals[ball[rows]].T)
+    view = _View(
+        np.ascontiguousarray(place[:, rows]),
+        np.ascontiguousarray(frame @ nearby.surface.normals[ball[rows]].T),
+    )
     tolerance = max(3.0 * nearby.surface.noise / radius, 0.03)
-    best = max(_best_of(view, STARTS, BEND_RADII, AZIMUTHS, tolerance), key=lambda found: found[0])
+    best = view.best_of(STARTS, BEND_RADII, AZIMUTHS, tolerance)
     if best[0] < max(MIN_POINTS, BETTER * view.straight_on(tolerance)):
         return None
     _, start, bend_radius, azimuth = best
     fine = np.linspace(-1.0, 1.0, 7)
     for share in (1.0, 0.3):
-        _, start, bend_radius, azimuth = max(
-            _best_of(
-                view,
-                start + share * 0.4 * fine,
-                np.maximum(bend_radius * (1.0 + share * 0.15 * fine), 1.05),
-                azimuth + share * np.deg2rad(12.0) * fine,
-                tolerance,
-            ),
-            key=lambda found: found[0],
+        _, start, bend_radius, azimuth = view.best_of(
+            start + share * 0.4 * fine,
+            np.maximum(bend_radius * (1.0 + share * 0.15 * fine), 1.05),
+            azimuth + share * np.deg2rad(12.0) * fine,
+            tolerance,
         )
     inward = np.cos(azimuth) * frame[1] + np.sin(azimuth) * frame[2]
     begin = origin + start * radius * ahead
@@ -134,18 +143,6 @@ def follow_end(
     low = float(arc_angles(bend, begin[None])[0])
     piece = Piece(bend, NO_ELLIPSES, low, low + float(np.quantile(angle[on], 0.98)))
     return piece, _straight_beyond(bend, inward, ahead, nearby, is_free)
-
-
-def _best_of(
-    view: _View, starts: Array, bend_radii: Array, azimuths: Array, tolerance: float
-) -> Iterator[tuple[int, float, float, float]]:
-    """The best azimuth for each start and bend radius: number of points, and what has it."""
-    for start in map(float, starts):
-        for bend_radius in map(float, bend_radii):
-            on, _ = view.bent(start, bend_radius, azimuths, tolerance)
-            count = on.sum(axis=1)
-            k = int(np.argmax(count))
-            yield int(count[k]), start, bend_radius, float(azimuths[k])
 
 
 def _straight_beyond(

@@ -37,7 +37,11 @@ def refine_pieces(
     put_off = keeper.try_pieces(straights, progress, (0.31, 0.65), min_lengths=SHORT)
     progress.update("elements", 0.65)
     joinable = list(keeper.fitted)
-    for corner, bend_radius, ends in find_corners(joinable, nearby):
+
+    def check() -> None:
+        progress.update("elements", 0.66)
+
+    for corner, bend_radius, ends in find_corners(joinable, nearby, check):
         progress.update("elements", 0.67)
         keeper.try_bend(corner, bend_radius, ends)
     for piece, ends in propose_reducers(joinable):
@@ -134,7 +138,7 @@ class _Keeper:
             n = len(self.fitted)
             if straight is not None:
                 self.try_piece(straight)
-            new = [e for e in straight_ends(self.fitted) if e.which[0] >= n]
+            new = straight_ends(self.fitted, n)
             for other in new:
                 corner = corner_between(self.fitted, end, other, self._nearby)
                 if corner is not None:
