@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.allocation import Allocate, in_memory
 from pipecore.deformation import curvature_variations, find_deformations
 from pipecore.elements import BuiltElements, NearbyPoints
 from pipecore.elements.sections import cut_normal_stack
@@ -56,19 +57,16 @@ def measure_elements(
     fit: EllipseFit,
     progress: Progress,
     others: tuple[Element, ...] = (),
-    per_point: tuple[NDArray[np.int32], NDArray[np.float32]] | None = None,
+    allocate: Allocate = in_memory,
 ) -> Measurement:
     """Measure every element on all points around it.
 
     `others` are not measured, but what touches an element there is no deformation of it.
-    `per_point` are arrays to take for the measurement's, full of `NO_ID` and nan.
+    `allocate` makes the arrays with a value for each point of the cloud.
     """
     everything = built.elements + others
     boxes = _boxes(everything)
-    element_id, deviation = per_point or (
-        np.full(n_points, NO_ID, np.int32),
-        np.full(n_points, np.nan, np.float32),
-    )
+    element_id, deviation = _of_no_element(n_points, allocate)
     measured: list[_Measured] = []
     n = len(built.elements)
     for start in range(0, n, AT_ONCE):
@@ -96,6 +94,17 @@ def measure_elements(
         element_id,
         deviation,
     )
+
+
+def _of_no_element(
+    n_points: int, allocate: Allocate
+) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Element and deviation of points that are of no element."""
+    element_id: NDArray[np.int32] = allocate("element_id", (n_points,), np.int32)
+    deviation: NDArray[np.float32] = allocate("deviation", (n_points,), np.float32)
+    element_id[:] = NO_ID
+    deviation[:] = np.nan
+    return element_id, deviation
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The pipeline, in the paper's order."""
+"""The pipeline, in the paper's order, wherever the points are."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -12,16 +12,15 @@ from pipecore.axes import join_centres
 from pipecore.deformation import relate_deformations
 from pipecore.elements import NearbyPoints, build_elements, find_pieces
 from pipecore.elements.sections import tabulate_ellipses
-from pipecore.ellipses import Ellipses, fit_ellipses
+from pipecore.ellipses import Ellipses
 from pipecore.measurement import measure_elements
-from pipecore.profiles import segment_profiles
-from pipecore.progress import NoProgress, Progress, Renamed
+from pipecore.progress import NoProgress, Progress
 from pipecore.rules import Rule, judge, load_rule
 from pipecore.segments import Overlay
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
-from pipecore.surface import sample_surface
 from pipecore.types import Deformation, Element, PointCloud, Profiles, Result
+from pipecore.workspace import InMemory, Workspace, spread
 
 STAGES = {
     "thinning": 0.08,
@@ -61,47 +60,39 @@ def detect(
     SettingsError
         If the acceptance rule of the settings cannot be read, or they ask for no stacks.
     """
+    return detect_in(InMemory(cloud), settings, progress)
+
+
+def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Result:
+    """Find the elements of a workspace's cloud and their deformations; see `detect`."""
+    cloud = points.cloud
     rule = load_rule(settings.deformation.rule)
     if len(cloud) == 0:
         return _nothing_found(cloud, settings)
     seconds: dict[str, float] = {}
-    max_radius = settings.elements.max_radius_mm / 1e3
     with _timed(seconds, "surface"):
-        surface = sample_surface(cloud, settings.thinning, progress)
+        surface = points.sample_surface(settings.thinning, progress)
     with _timed(seconds, "stacks"):
-        stacks = choose_stacks(surface, settings.stacks, progress)
-    overlay, found = Overlay(len(surface.xyz)), []
-    for stack, (begin, end) in _shares(stacks):
+        stacks = choose_stacks(surface, settings.stacks, progress, points.local_axes)
+    overlay, found = Overlay(len(surface.xyz), points.allocate), []
+    for stack, span in _shares(stacks):
         # Stack by stack: the curves of all together need more memory than the cloud.
-        middle = begin + 0.85 * (end - begin)
         with _timed(seconds, "profiles"):
-            curves = segment_profiles(
-                surface, stack, settings.profiles, max_radius, progress, (begin, middle)
-            )
-        with _timed(seconds, "segments"):
-            overlay.add(curves)
-        with _timed(seconds, "ellipses"):
-            found.append(
-                fit_ellipses(
-                    curves,
-                    surface,
-                    settings.ellipses,
-                    settings.elements,
-                    Renamed(progress, "profiles"),
-                    (middle, end),
-                )
-            )
+            for curve_points, starts, own in points.cut(surface, stack, settings, progress, span):
+                overlay.add(curve_points, starts)
+                found.append(own)
     with _timed(seconds, "segments"):
-        progress.update("segments", 0.0)
-        segments = overlay.number_segments()
+        segments = overlay.number_segments(progress)
+        behind = points.behind(surface)
+        segment_id = spread(segments, behind, points.allocate, progress)
+        surface = replace(surface, parent=segment_id[:0])  # told by what is behind
     with _timed(seconds, "ellipses"):
-        progress.update("ellipses", 0.0)
         ellipses = Ellipses.concatenate(found)
     with _timed(seconds, "axes"):
         chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):
         pieces = find_pieces(ellipses, chains, progress)
-        nearby = NearbyPoints(cloud, surface, progress=progress)
+        nearby = NearbyPoints(cloud, surface, behind, progress, points.allocate)
         built = build_elements(pieces, nearby, settings.elements, progress)
         profiles = tabulate_ellipses(built.elements, ellipses)
     with _timed(seconds, "deformations"):
@@ -113,6 +104,7 @@ def detect(
             settings.deformation,
             settings.ellipses.fit,
             progress,
+            allocate=points.allocate,
         )
         deformations = judge_deformations(measured.deformations, measured.elements, rule)
     return Result(
@@ -124,7 +116,7 @@ def detect(
         elements=measured.elements,
         profiles=Profiles.concatenate([measured.profiles, profiles]),
         deformations=deformations,
-        segment_id=segments[surface.parent],
+        segment_id=segment_id,
         element_id=measured.element_id,
         deviation=measured.deviation,
         seconds=seconds,

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import nearby as kernels
-from pipecore._kernels.grouping import group_by_label
+from pipecore._kernels.grouping import group_by_label, group_into
+from pipecore._kernels.voxels import rename_voxels
+from pipecore.allocation import Allocate, in_memory
 from pipecore.elements.surfaces import SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.progress import NoProgress, Progress
@@ -86,6 +88,8 @@ class NearbyPoints:
         begin, if known; by default found from `surface.parent`.
     progress : Progress
         Told now and then while the points are put into cells.
+    allocate : callable
+        Makes the arrays with a value for each thinned point.
     """
 
     def __init__(
@@ -94,6 +98,7 @@ class NearbyPoints:
         surface: Surface,
         behind: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
         progress: Progress = NoProgress(),
+        allocate: Allocate = in_memory,
     ) -> None:
         self._cloud = cloud
         self.surface = surface
@@ -104,7 +109,7 @@ class NearbyPoints:
         frame = GridFrame.of(surface.xyz, edge)
         first, _, n_y, n_z = frame.numbers
         counter = VoxelCounter(frame)
-        cell = np.empty(len(surface.xyz), np.int32)
+        cell = allocate("cell_of_point", (len(surface.xyz),), np.int32)
         for start in range(0, len(cell), AT_ONCE):
             progress.update("elements", BEGUN)
             counter.add(surface.xyz, start, min(start + AT_ONCE, len(cell)), cell)
@@ -124,7 +129,9 @@ class NearbyPoints:
         rank = np.empty(len(order), np.int32)
         rank[order] = np.arange(len(order), dtype=np.int32)
         progress.update("elements", BEGUN)
-        self._cells: tuple[Indices, Indices] = group_by_label(rank[cell], len(order))
+        rename_voxels(cell, 0, len(cell), rank)
+        points = allocate("points_of_cells", (len(cell),), np.int32)
+        self._cells = points, group_into(cell, len(order), points)
 
     def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""

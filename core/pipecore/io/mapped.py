@@ -1,12 +1,38 @@
 """Room on the disk for arrays that are mapped into memory."""
 
 import errno
+import mmap
 import os
 import shutil
+import threading
 from pathlib import Path
+from typing import Any
+from weakref import WeakSet
 
 import numpy as np
 from numpy.typing import NDArray
+
+_maps: "WeakSet[mmap.mmap]" = WeakSet()
+_lock = threading.Lock()
+
+
+def as_mapped(array: np.memmap[Any, Any]) -> NDArray[Any]:
+    """Take a mapped array as any other; `drop_pages` knows of it as long as it is there."""
+    owner: Any = getattr(array, "_mmap", None)
+    if owner is not None:
+        with _lock:
+            _maps.add(owner)
+    return np.asarray(array)
+
+
+def drop_pages() -> None:
+    """Give the memory into which files are mapped back; what they hold stays on the disk."""
+    if not hasattr(mmap, "MADV_DONTNEED"):
+        return
+    with _lock:
+        maps = list(_maps)
+    for mapped in maps:
+        mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def reserve(path: Path, n_bytes: int) -> None:
@@ -56,4 +82,4 @@ class MappedFile:
         reserve(self._path, int(np.prod(shape)) * self._dtype.itemsize)
         if n_rows == 0:
             return np.empty(shape, self._dtype)
-        return np.asarray(np.memmap(self._path, self._dtype, "r+", shape=shape))
+        return as_mapped(np.memmap(self._path, self._dtype, "r+", shape=shape))

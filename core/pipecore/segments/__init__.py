@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import components
+from pipecore.allocation import BLOCK, Allocate, in_memory
 from pipecore.profiles import Curves
-from pipecore.progress import Progress
+from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.types import NO_ID
 
 MIN_SEGMENT = 20
@@ -18,24 +19,46 @@ class Overlay:
     """Stacks laid over each other: points that share a curve in any stack are one component.
 
     Stacks are added one by one, so that no two need be held at a time.
+
+    Parameters
+    ----------
+    n_points : int
+        Number of points of the surface.
+    allocate : callable, optional
+        Makes the arrays with a value for each of them.
     """
 
-    def __init__(self, n_points: int) -> None:
-        self._parents = np.arange(n_points, dtype=np.int32)
+    def __init__(self, n_points: int, allocate: Allocate = in_memory) -> None:
+        self._allocate = allocate
+        self._parents: NDArray[np.int32] = allocate("parents", (n_points,), np.int32)
+        for start in range(0, n_points, BLOCK):
+            stop = min(start + BLOCK, n_points)
+            self._parents[start:stop] = np.arange(start, stop)
 
-    def add(self, curves: Curves) -> None:
-        """Join the points that share a curve of this stack."""
-        components.unite_groups(curves.points, curves.starts, self._parents)
+    def add(self, points: NDArray[np.int32], starts: NDArray[np.int64]) -> None:
+        """Join the points that share a curve: rows starts[c] … starts[c + 1] of `points`."""
+        components.unite_groups(points, starts, self._parents)
 
-    def number_segments(self) -> NDArray[np.int32]:
+    def number_segments(self, progress: Progress = NoProgress()) -> NDArray[np.int32]:
         """Return the segment of each point, 1 for the largest; `NO_ID` for points of none."""
+        n = len(self._parents)
+        progress.update("segments", 0.0)
         components.flatten(self._parents)
-        sizes = np.bincount(self._parents)
-        roots = np.flatnonzero(sizes >= MIN_SEGMENT)
-        roots = roots[np.lexsort((roots, -sizes[roots]))]
-        number = np.full(len(sizes), NO_ID, np.int32)
-        number[roots] = np.arange(1, len(roots) + 1)
-        return number[self._parents]
+        sizes = self._allocate("sizes", (n,), np.int32)
+        roots = [np.empty(0, np.intp)]
+        for start, stop in in_chunks(n, BLOCK, "segments", progress):
+            components.count_members(self._parents[start:stop], sizes)
+        for start, stop in in_chunks(n, BLOCK, "segments", progress):
+            roots.append(start + np.flatnonzero(sizes[start:stop] >= MIN_SEGMENT))
+        by_size = np.concatenate(roots)
+        by_size = by_size[np.lexsort((by_size, -sizes[by_size]))]
+        # From here on a root's size is replaced by its number.
+        sizes[:] = NO_ID
+        sizes[by_size] = np.arange(1, len(by_size) + 1)
+        segments = self._allocate("segments", (n,), np.int32)
+        for start, stop in in_chunks(n, BLOCK, "segments", progress):
+            segments[start:stop] = sizes[self._parents[start:stop]]
+        return segments
 
 
 def overlay_stacks(
@@ -59,6 +82,6 @@ def overlay_stacks(
     overlay = Overlay(n_points)
     for i, stack_curves in enumerate(curves):
         progress.update("segments", i / len(curves))
-        overlay.add(stack_curves)
+        overlay.add(stack_curves.points, stack_curves.starts)
     progress.update("segments", 1.0)
     return overlay.number_segments()

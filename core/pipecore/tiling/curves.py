@@ -5,29 +5,32 @@ those of the whole cloud. What joins batches and stacks are the thinned points t
 curves share.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import components
-from pipecore.ellipses import Ellipses, fit_ellipses
-from pipecore.profiles import MAX_SLOPE, segment_profiles
-from pipecore.progress import Progress, in_chunks
-from pipecore.segments import MIN_SEGMENT
+from pipecore._kernels import profiles as kernels
+from pipecore._kernels.grouping import argsort_keys
+from pipecore.ellipses import Ellipses
+from pipecore.profiles import MAX_SLOPE
+from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
 from pipecore.surface import Surface
 from pipecore.tiling.engine import Engine
-from pipecore.tiling.store import StopWhenUnwanted, Store, drop_pages
+from pipecore.tiling.store import StopWhenUnwanted, Store
 from pipecore.tiling.thinning import Rows, TiledSurface
-from pipecore.types import NO_ID, Stack
+from pipecore.types import Stack
+from pipecore.workspace import Cut, cut_and_fit
 
 Array = NDArray[np.float64]
 
 BYTES_PER_POINT = 420
 """What cutting a thinned point into a profile and fitting its curve takes at the most."""
-BLOCK = 2_000_000
+SORTING = 0.3
+"""Share of the time that sorting points by profile takes."""
 
 
 @dataclass(frozen=True)
@@ -52,57 +55,38 @@ def local_axes_in_slabs(engine: Engine, tiled: TiledSurface, progress: Progress)
     return np.concatenate(engine.run(axes_of_slab, tiles, "directions", progress))
 
 
-def ellipses_of_stacks(
+def cut_in_batches(
     engine: Engine,
     tiled: TiledSurface,
-    stacks: tuple[Stack, ...],
+    stack: Stack,
     settings: Settings,
     batch_bytes: int,
     progress: Progress,
-) -> tuple[Ellipses, NDArray[np.int32]]:
-    """Segment the profiles of all stacks and fit their ellipses.
+    span: tuple[float, float],
+) -> Iterator[Cut]:
+    """Segment the profiles of a stack and fit their ellipses, a batch of profiles at a time.
 
-    Returns
-    -------
-    ellipses : Ellipses
-        Of all stacks, in their order.
-    segments : ndarray of int32, shape (m,)
-        The segment of each thinned point, an array of the engine's store.
+    Yields
+    ------
+    Cut
+        Of each batch, in their order; the points are there until the next.
     """
+    store = engine.store
+    begin, end = span
+    middle = begin + SORTING * (end - begin)
     facts = Facts(tiled.surface.voxel, tiled.surface.noise)
     firsts = tuple(slab.surface[0] for slab in tiled.slabs)
-    m = len(tiled.surface.xyz)
-    parents = engine.store.create("parents", (m,), np.int32)
-    for start in range(0, m, BLOCK):
-        parents[start : start + BLOCK] = np.arange(start, min(start + BLOCK, m))
-    tables = []
-    for i, stack in enumerate(stacks):
-        span = i / len(stacks), (i + 0.3) / len(stacks), (i + 1) / len(stacks)
-        sorted_slabs = engine.run(
-            sort_slab,
-            [(k, slab.surface, stack) for k, slab in enumerate(tiled.slabs)],
-            "profiles",
-            progress,
-            span[:2],
-        )
-        batches = _batches(sorted_slabs, max(1, batch_bytes // BYTES_PER_POINT))
-        results = engine.run(
-            ellipses_of_batch,
-            [(k, begins, firsts, stack, settings, facts) for k, begins in enumerate(batches)],
-            "profiles",
-            progress,
-            span[1:],
-        )
-        for k, table in enumerate(results):
-            tables.append(table)
-            points, starts = (engine.store.open(f"{name}-{k}") for name in ("points", "curves"))
-            components.unite_groups(points, starts, parents)
-            engine.store.remove(f"points-{k}", f"curves-{k}")
-        engine.store.remove(*(f"sorted-{k}" for k in range(len(tiled.slabs))))
-        drop_pages(parents)
-    segments = number_segments(engine.store, parents, progress)
-    engine.store.remove("parents")
-    return Ellipses.concatenate(tables), segments
+    slabs = [(k, slab.surface, stack) for k, slab in enumerate(tiled.slabs)]
+    sorted_slabs = engine.run(sort_slab, slabs, "profiles", progress, (begin, middle))
+    batches = [
+        (k, begins, firsts, stack, settings, facts)
+        for k, begins in enumerate(_batches(sorted_slabs, max(1, batch_bytes // BYTES_PER_POINT)))
+    ]
+    tables = engine.run(ellipses_of_batch, batches, "profiles", progress, (middle, end))
+    store.remove(*(f"sorted-{k}" for k in range(len(slabs))))
+    for k, table in enumerate(tables):
+        yield store.open(f"points-{k}"), store.open(f"curves-{k}"), table
+        store.remove(f"points-{k}", f"curves-{k}")
 
 
 def _batches(
@@ -125,34 +109,6 @@ def _batches(
     return batches or [np.zeros((len(counts), 2), np.int64)]
 
 
-def number_segments(
-    store: Store, parents: NDArray[np.int32], progress: Progress
-) -> NDArray[np.int32]:
-    """Number the components as `pipecore.segments.overlay_stacks` does."""
-    m = len(parents)
-    components.flatten(parents)
-    sizes = store.create("sizes", (m,), np.int32)
-    for start, stop in in_chunks(m, BLOCK, "segments", progress):
-        components.count_members(parents[start:stop], sizes)
-    roots = np.concatenate(
-        [
-            start + np.flatnonzero(sizes[start : start + BLOCK] >= MIN_SEGMENT)
-            for start in range(0, m, BLOCK)
-        ]
-    )
-    by_size = roots[np.lexsort((roots, -sizes[roots]))]
-    # From here on a root's size is replaced by its number.
-    segments = store.create("segments", (m,), np.int32)
-    for start in range(0, m, BLOCK):
-        sizes[start : start + BLOCK] = NO_ID
-    sizes[by_size] = np.arange(1, len(by_size) + 1)
-    for start, stop in in_chunks(m, BLOCK, "segments", progress):
-        segments[start:stop] = sizes[parents[start:stop]]
-    drop_pages(parents, sizes, segments)
-    store.remove("sizes")
-    return segments
-
-
 # What follows runs on the workers.
 
 
@@ -173,18 +129,17 @@ def sort_slab(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Write a slab's points that join a stack by profile; return profiles and their counts."""
     StopWhenUnwanted(store).update("profiles", 0.0)
-    dx, dy, dz = stack.direction
-    x, y, z = np.array(store.open("normals")[slice(*rows)]).T
-    # Who joins in the end is decided where the profile is cut.
-    joins = np.abs(x * dx + y * dy + z * dz) < MAX_SLOPE + 1e-9
-    if stack.min_spacing:
-        joins &= store.open("spacing")[slice(*rows)] >= stack.min_spacing
-    index = np.flatnonzero(joins)
-    x, y, z = store.open("surface")[slice(*rows)][index].T
-    profile = np.floor((x * dx + y * dy + z * dz - stack.offset) / stack.width).astype(np.int64)
-    order = np.argsort(profile, kind="stable")
-    store.save(f"sorted-{number}", index[order].astype(np.int32))
-    profiles, counts = np.unique(profile, return_counts=True)
+    xyz, normals, spacing = (store.open(n)[slice(*rows)] for n in ("surface", "normals", "spacing"))
+    profile = np.empty(rows[1] - rows[0], np.int32)
+    kernels.find_profiles(
+        xyz, normals, spacing, 0, len(profile), stack.direction, stack.width, stack.offset,
+        MAX_SLOPE, stack.min_spacing, profile,
+    )  # fmt: skip
+    joins = np.flatnonzero(profile != kernels.NOT_CUT)
+    keys = profile[joins].astype(np.int64)
+    order = argsort_keys(keys - keys.min(initial=0))
+    store.save(f"sorted-{number}", joins[order].astype(np.int32))
+    profiles, counts = np.unique(keys, return_counts=True)
     return profiles, counts
 
 
@@ -198,12 +153,13 @@ def ellipses_of_batch(
     facts: Facts,
 ) -> Ellipses:
     """Segment whole profiles and fit their ellipses; write the points of their curves."""
-    progress = StopWhenUnwanted(store)
-    parts = [
-        first + np.sort(store.open(f"sorted-{k}")[a:b].astype(np.int64))
-        for k, (first, (a, b)) in enumerate(zip(firsts, begins.tolist(), strict=True))
-    ]
-    index = np.concatenate(parts)
+    # In each profile in the order of the whole surface, since the slabs are.
+    index = np.concatenate(
+        [
+            store.open(f"sorted-{k}")[a:b] + np.int32(first)
+            for k, (first, (a, b)) in enumerate(zip(firsts, begins.tolist(), strict=True))
+        ]
+    )
     surface = Surface(
         store.open("surface")[index],
         store.open("normals")[index],
@@ -212,10 +168,8 @@ def ellipses_of_batch(
         facts.voxel,
         facts.noise,
     )
-    max_radius = settings.elements.max_radius_mm / 1e3
-    curves = segment_profiles(surface, stack, settings.profiles, max_radius, progress)
+    curves, ellipses = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
     store.save(f"points-{number}", index[curves.points])
     store.save(f"curves-{number}", curves.starts)
-    ellipses = fit_ellipses(curves, surface, settings.ellipses, settings.elements, progress)
     # Without the profile's frame as a view, which does not travel.
     return Ellipses(*(np.array(getattr(ellipses, f.name)) for f in fields(Ellipses)))

@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 PATIENCE = 0.2
 """Progress is reported, and cancelling noticed, at least this often, seconds."""
 _CONNECT_TIMEOUT = "5s"
+_CALM = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+}
+"""dask looks at its own threads so often that this costs 3 % of a core."""
 _ANY_PORT = "127.0.0.1:0"
 
 
@@ -109,7 +115,7 @@ def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
 
     for name in ("distributed", "distributed.worker", "distributed.scheduler"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    with dask.config.set({"distributed.comm.timeouts.connect": _CONNECT_TIMEOUT}):
+    with dask.config.set({"distributed.comm.timeouts.connect": _CONNECT_TIMEOUT} | _CALM):
         if not scheduler:
             n_threads = parallel.threads()
             with (

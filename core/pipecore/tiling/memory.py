@@ -1,11 +1,14 @@
 """How much memory a detection takes in one piece, and how large tiles may be."""
 
 import math
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipecore.io import identify
+from pipecore.io.mapped import drop_pages
 from pipecore.settings import TilingSettings
 
 GIB = 2**30
@@ -73,3 +76,37 @@ def tile_bytes(n_points: int, limit: int, n_at_once: int) -> int:
     """Memory that one of several tiles may take beside what is always there."""
     left = limit - BASE_BYTES - KEPT_BYTES * n_points
     return max(SMALLEST_TILE, math.floor(left / n_at_once))
+
+
+OFTEN, SELDOM = 0.1, 2.0
+"""Between two looks at the memory, and after a look that could not help, seconds."""
+FULL = 0.8
+"""From this share of the limit on, pages of files are given back."""
+
+
+@contextmanager
+def keeping_within(limit: int) -> Iterator[None]:
+    """Give the memory into which files are mapped back whenever the process nears a limit.
+
+    What is needed again is read again, mostly from the system's own cache.
+    """
+    import psutil  # noqa: PLC0415
+
+    process, is_over = psutil.Process(), threading.Event()
+
+    def look() -> None:
+        pause = OFTEN
+        while not is_over.wait(pause):
+            pause = OFTEN
+            if process.memory_info().rss > FULL * limit:
+                drop_pages()
+                if process.memory_info().rss > FULL * limit:
+                    pause = SELDOM
+
+    watch = threading.Thread(target=look, name="pipecore memory", daemon=True)
+    watch.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        watch.join()

@@ -1,7 +1,7 @@
 """A folder of arrays that are too large for memory, mapped into it."""
 
 import errno
-import mmap
+import json
 import os
 import secrets
 import shutil
@@ -17,10 +17,17 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from pipecore.errors import CancelledError, WriteError
-from pipecore.io import reserve
+from pipecore.io.mapped import as_mapped, reserve
 
 _MARK = "running"
 """While this file is there, the detection that owns the folder wants its results."""
+
+HEADER_BYTES = 128
+"""Kind and shape of an array, before its values.
+
+Not numpy's own header: reading that in several threads at once fails now and then before
+Python 3.11.9 (its issue 106905).
+"""
 
 
 @dataclass(frozen=True)
@@ -36,7 +43,7 @@ class Store:
 
     def path(self, name: str) -> Path:
         """Path of the array of this name."""
-        return self.folder / f"{name}.npy"
+        return self.folder / f"{name}.array"
 
     def create(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
         """Make an array of zeros on the disk and map it.
@@ -46,35 +53,42 @@ class Store:
         OSError
             If the disk has no room for it: before anything is written, not on the way.
         """
-        path = self.path(name)
-        facts = {"descr": np.dtype(dtype).str, "fortran_order": False, "shape": shape}
-        with path.open("wb") as file:
-            np.lib.format.write_array_header_1_0(file, facts)
-            start = file.tell()
-        reserve(path, start + int(np.prod(shape)) * np.dtype(dtype).itemsize)
-        return self.open(name, writable=True)
+        # Not into the file of a former array, which may still be mapped.
+        self.remove(name)
+        n_bytes = int(np.prod(shape)) * np.dtype(dtype).itemsize
+        self.path(name).write_bytes(_header(shape, dtype))
+        reserve(self.path(name), HEADER_BYTES + n_bytes)
+        return self.open(name)
 
-    def open(self, name: str, *, writable: bool = False) -> NDArray[Any]:
+    def open(self, name: str) -> NDArray[Any]:
         """Map an array; it is unmapped when the last reference to it is gone."""
-        path = self.path(name)
         try:
-            return np.asarray(np.load(path, mmap_mode="r+" if writable else "r"))
+            with self.path(name).open("rb") as file:
+                facts = json.loads(file.read(HEADER_BYTES))
         except FileNotFoundError:
             if self.is_wanted:
                 raise
             raise CancelledError from None
+        dtype, shape = np.dtype(facts["dtype"]), tuple(facts["shape"])
+        if 0 in shape:
+            return np.empty(shape, dtype)
+        # To be written even where it is only read: kernels are compiled for such arrays.
+        return as_mapped(np.memmap(self.path(name), dtype, "r+", HEADER_BYTES, shape))
 
     def open_coordinates(self) -> NDArray[Any]:
         """Map the coordinates that `pipecore.io.read` left in the folder, shape (n, 3)."""
         for dtype in (np.float64, np.float32):
             path = self.folder / f"xyz.{np.dtype(dtype).name}"
             if path.exists():
-                return np.asarray(np.memmap(path, dtype, "r")).reshape(-1, 3)
+                return as_mapped(np.memmap(path, dtype, "r+")).reshape(-1, 3)
         raise CancelledError
 
     def save(self, name: str, values: NDArray[Any]) -> None:
         """Write a whole array."""
-        np.save(self.path(name), values)
+        self.remove(name)
+        with self.path(name).open("wb") as file:
+            file.write(_header(values.shape, values.dtype))
+            file.write(np.ascontiguousarray(values).data)
 
     def remove(self, *names: str) -> None:
         """Delete arrays; those that are mapped somewhere go when that is over."""
@@ -90,6 +104,11 @@ class Store:
     def give_up(self) -> None:
         """Let all tiles know that they are wanted no longer."""
         (self.folder / _MARK).unlink(missing_ok=True)
+
+
+def _header(shape: tuple[int, ...], dtype: DTypeLike) -> bytes:
+    facts = {"dtype": np.dtype(dtype).str, "shape": shape}
+    return json.dumps(facts).encode().ljust(HEADER_BYTES)
 
 
 @contextmanager
@@ -138,16 +157,6 @@ def _remove(folder: Path) -> None:
         if not folder.exists():
             return
         time.sleep(0.1)
-
-
-def drop_pages(*arrays: NDArray[Any]) -> None:
-    """Give the memory of mapped arrays back; what they hold stays on the disk."""
-    for array in arrays:
-        owner: Any = array
-        while isinstance(owner, np.ndarray):
-            owner = owner.base
-        if isinstance(owner, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-            owner.madvise(mmap.MADV_DONTNEED)
 
 
 @dataclass

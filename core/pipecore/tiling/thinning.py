@@ -25,7 +25,7 @@ from pipecore.surface import (
 )
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.quantile import quantile
-from pipecore.tiling.store import StopWhenUnwanted, Store, drop_pages
+from pipecore.tiling.store import StopWhenUnwanted, Store
 
 Array = NDArray[np.float64]
 Rows = tuple[int, int]
@@ -122,7 +122,6 @@ def thin_in_slabs(
         # It looks at the points in passing, chunk by chunk.
         xyz = store.open_coordinates()
         edge = max(median_spacing(xyz, progress=progress), SMALLEST_VOXEL)
-        drop_pages(xyz)
     counted = engine.run(count_planes, [(p, edge) for p in parts], "thinning", progress, (0.3, 0.4))
     planes, which = np.unique(np.concatenate([p for p, _ in counted]), return_inverse=True)
     counts = np.zeros(len(planes), np.int64)
@@ -201,7 +200,6 @@ def _gather(store: Store, slabs: tuple[Slab, ...], n_points: int) -> None:
         rows = slice(*slab.surface)
         xyz[rows] = store.open(f"thinned-{k}")
         starts[rows] = store.open(f"starts-{k}") + slab.points[0]
-        drop_pages(xyz, starts)
         store.remove(f"thinned-{k}", f"starts-{k}")
 
 
@@ -278,7 +276,7 @@ def thin_slab(
     thinned = average_voxels(xyz, edge, progress)
     members, starts = group_by_label(thinned.parent, len(thinned.xyz))
     progress.update("thinning", 1.0)
-    all_members = store.open("members", writable=True)
+    all_members = store.open("members")
     all_members[first_point : first_point + len(rows)] = rows[members]
     store.save(f"thinned-{number}", thinned.xyz)
     store.save(f"starts-{number}", starts[:-1])
@@ -293,5 +291,5 @@ def fit_slab_planes(store: Store, own: Rows, near: Rows, edge: float) -> int:
     fitted = fit_planes(xyz, edge, StopWhenUnwanted(store))
     inside = slice(own[0] - near[0], own[1] - near[0])
     for name, values in zip(("normals", "residuals", "spacing"), fitted, strict=True):
-        store.open(name, writable=True)[slice(*own)] = values[inside]
+        store.open(name)[slice(*own)] = values[inside]
     return int(np.count_nonzero(~np.isnan(fitted[0][inside, 0])))

@@ -1,0 +1,70 @@
+"""A cloud larger than memory: its points in files, looked at tile by tile."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.allocation import Allocate
+from pipecore.progress import Progress
+from pipecore.settings import Settings, ThinningSettings
+from pipecore.surface import Surface
+from pipecore.tiling.curves import cut_in_batches, local_axes_in_slabs
+from pipecore.tiling.engine import Engine
+from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
+from pipecore.types import PointCloud, Stack
+from pipecore.workspace import Behind, Cut
+
+
+class InTiles:
+    """The points of a cloud in a store, which dask's workers share; see `Workspace`.
+
+    Parameters
+    ----------
+    engine : Engine
+        Its store holds the cloud's coordinates.
+    cloud : PointCloud
+    slab_bytes, batch_bytes : int
+        What a slab of the cloud, and a batch of profiles, may take in memory.
+    """
+
+    def __init__(
+        self, engine: Engine, cloud: PointCloud, slab_bytes: int, batch_bytes: int
+    ) -> None:
+        self.cloud = cloud
+        self.allocate: Allocate = engine.store.create
+        self._engine = engine
+        self._slab_bytes, self._batch_bytes = slab_bytes, batch_bytes
+        self._tiled: TiledSurface | None = None
+
+    def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
+        """See `Workspace`; the surface's parents are known by what is behind it alone."""
+        self._tiled = thin_in_slabs(
+            self._engine, len(self.cloud), settings, self._slab_bytes, progress
+        )
+        return self._tiled.surface
+
+    def behind(self, surface: Surface) -> Behind:
+        """See `Workspace`."""
+        return self._engine.store.open("members"), self._engine.store.open("starts")
+
+    def local_axes(self, surface: Surface, progress: Progress) -> NDArray[np.float64]:
+        """See `Workspace`."""
+        return local_axes_in_slabs(self._engine, self._known(), progress)
+
+    def cut(
+        self,
+        surface: Surface,
+        stack: Stack,
+        settings: Settings,
+        progress: Progress,
+        span: tuple[float, float],
+    ) -> Iterator[Cut]:
+        """See `Workspace`."""
+        return cut_in_batches(
+            self._engine, self._known(), stack, settings, self._batch_bytes, progress, span
+        )
+
+    def _known(self) -> TiledSurface:
+        assert self._tiled is not None, "the surface has not been sampled"
+        return self._tiled

@@ -1,0 +1,130 @@
+"""Where a cloud's points are while it is detected, and the steps that look at all of them.
+
+In memory they are taken together. `pipecore.tiling` has a workspace of files for clouds that
+are larger, with the same results.
+"""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels.grouping import group_by_label
+from pipecore.allocation import BLOCK, Allocate, in_memory
+from pipecore.ellipses import Ellipses, fit_ellipses
+from pipecore.profiles import Curves, segment_profiles
+from pipecore.progress import Progress, Renamed, in_chunks
+from pipecore.settings import Settings, ThinningSettings
+from pipecore.stacks.directions import local_axes
+from pipecore.surface import Surface, sample_surface
+from pipecore.types import PointCloud, Stack
+
+Array = NDArray[np.float64]
+Behind = tuple[NDArray[np.int64], NDArray[np.int64]]
+"""The cloud's points in the order of their thinned points, and where those of each begin."""
+Cut = tuple[NDArray[np.int32], NDArray[np.int64], Ellipses]
+"""The thinned points of some curves, where those of each begin, and the curves' ellipses."""
+
+
+class Workspace(Protocol):
+    """Holds a cloud and takes the steps that look at all of its points."""
+
+    @property
+    def cloud(self) -> PointCloud:
+        """The cloud."""
+        ...
+
+    @property
+    def allocate(self) -> Allocate:
+        """Makes arrays with a value for each point, of the cloud or thinned."""
+        ...
+
+    def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
+        """Thin the cloud and estimate the normals of the thinned points."""
+        ...
+
+    def behind(self, surface: Surface) -> Behind:
+        """Tell which points of the cloud each thinned point stands for."""
+        ...
+
+    def local_axes(self, surface: Surface, progress: Progress) -> Array:
+        """Directions of the local axis at sampled curved places of the surface."""
+        ...
+
+    def cut(
+        self,
+        surface: Surface,
+        stack: Stack,
+        settings: Settings,
+        progress: Progress,
+        span: tuple[float, float],
+    ) -> Iterator[Cut]:
+        """Cut a stack, join the points of its profiles to curves and fit their ellipses."""
+        ...
+
+
+class InMemory:
+    """The points of a cloud in memory, taken together."""
+
+    def __init__(self, cloud: PointCloud) -> None:
+        self.cloud = cloud
+        self.allocate: Allocate = in_memory
+
+    def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
+        """See `Workspace`."""
+        return sample_surface(self.cloud, settings, progress)
+
+    def behind(self, surface: Surface) -> Behind:
+        """See `Workspace`."""
+        members, starts = group_by_label(surface.parent, len(surface.xyz))
+        return members, starts
+
+    def local_axes(self, surface: Surface, progress: Progress) -> Array:
+        """See `Workspace`."""
+        return local_axes(surface, progress)
+
+    def cut(
+        self,
+        surface: Surface,
+        stack: Stack,
+        settings: Settings,
+        progress: Progress,
+        span: tuple[float, float],
+    ) -> Iterator[Cut]:
+        """See `Workspace`."""
+        curves, ellipses = cut_and_fit(surface, stack, settings, progress, span)
+        yield curves.points, curves.starts, ellipses
+
+
+def cut_and_fit(
+    surface: Surface,
+    stack: Stack,
+    settings: Settings,
+    progress: Progress,
+    span: tuple[float, float] = (0.0, 1.0),
+) -> tuple[Curves, Ellipses]:
+    """Cut a stack of a surface or of a part that holds whole profiles; fit its ellipses."""
+    begin, end = span
+    middle = begin + 0.85 * (end - begin)
+    max_radius = settings.elements.max_radius_mm / 1e3
+    curves = segment_profiles(
+        surface, stack, settings.profiles, max_radius, progress, (begin, middle)
+    )
+    told = Renamed(progress, "profiles")
+    ellipses = fit_ellipses(
+        curves, surface, settings.ellipses, settings.elements, told, (middle, end)
+    )
+    return curves, ellipses
+
+
+def spread(
+    values: NDArray[np.int32], behind: Behind, allocate: Allocate, progress: Progress
+) -> NDArray[np.int32]:
+    """Give each point of the cloud the value of its thinned point."""
+    members, starts = behind
+    spread_out: NDArray[np.int32] = allocate("segment_id", (len(members),), np.int32)
+    for first, last in in_chunks(len(values), BLOCK, "segments", progress):
+        own = members[starts[first] : starts[last]]
+        spread_out[own] = np.repeat(values[first:last], np.diff(starts[first : last + 1]))
+    return spread_out
