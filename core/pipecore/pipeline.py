@@ -87,6 +87,7 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
         segment_id = spread(segments, behind, points.allocate, progress)
         surface = replace(surface, parent=segment_id[:0])  # told by what is behind
     with _timed(seconds, "ellipses"):
+        progress.update("ellipses", 0.0)
         ellipses = Ellipses.concatenate(found)
     with _timed(seconds, "axes"):
         chains = join_centres(ellipses, progress)

@@ -19,6 +19,8 @@ MAX_RADIUS_CHANGE = 0.06
 """Their radii differ by less than this share (and twice its standard deviation)."""
 MAX_OFFSET = 0.1
 """They are off each other's axis by less than this share of the radius."""
+AT_ONCE = 500_000
+"""Pairs that are looked at together."""
 
 
 def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
@@ -51,8 +53,10 @@ def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
         pairs = near.query_pairs(distance, output_type="ndarray")
         if k > 0:
             pairs = members[pairs]
-        links.append(pairs[_follow(ellipses, pairs[:, 0], pairs[:, 1])])
-        progress.update("axes", 0.5)
+        for start in range(0, max(len(pairs), 1), AT_ONCE):
+            some = pairs[start : start + AT_ONCE]
+            links.append(some[_follow(ellipses, some[:, 0], some[:, 1])])
+            progress.update("axes", 0.5)
     i, j = np.concatenate(links).T
     graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(n, n))
     _, label = connected_components(graph, directed=False)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from pipecore.errors import WriteError
 from pipecore.io.atomic import write_file
@@ -27,6 +27,7 @@ def write_laz(
     extra: Mapping[str, NDArray[Any]] | None = None,
     *,
     factors: Mapping[str, float] | None = None,
+    kinds: Mapping[str, DTypeLike] | None = None,
     length_unit: LengthUnit = LengthUnit.METRE,
     progress: Progress | None = None,
 ) -> None:
@@ -42,6 +43,8 @@ def write_laz(
         up to 32 characters.
     factors : mapping of str to float, optional
         What some of the extra values are multiplied by when they are written.
+    kinds : mapping of str to dtype, optional
+        As what some of the extra values are written, where that is not what they are.
     length_unit : LengthUnit
         Unit of the coordinates written.
     progress : Progress, optional
@@ -60,7 +63,7 @@ def write_laz(
     """
     import laspy  # noqa: PLC0415
 
-    extra = extra or {}
+    extra, kinds = extra or {}, kinds or {}
     for name, values in extra.items():
         if len(values) != len(cloud) or values.ndim != 1:
             raise ValueError(f"“{name}” has shape {values.shape}, not ({len(cloud)},).")
@@ -73,7 +76,10 @@ def write_laz(
     header.scales = np.full(3, step)
     header.offsets = np.round(cloud.origin / length_unit.metres)
     header.add_extra_dims(
-        [laspy.ExtraBytesParams(name, _storable(values).dtype) for name, values in extra.items()]
+        [
+            laspy.ExtraBytesParams(name, np.dtype(kinds.get(name, _storable(values[:0]).dtype)))
+            for name, values in extra.items()
+        ]
     )
     intensity = _LasIntensity(cloud)
     with (

@@ -151,16 +151,20 @@ def write_segments(
         path,
         cloud,
         {
-            "segment_id": _narrowed(result.segment_id),
-            "element_id": _narrowed(result.element_id),
+            "segment_id": result.segment_id,
+            "element_id": result.element_id,
             "deviation_mm": result.deviation,
         },
         factors={"deviation_mm": 1000.0},
+        kinds={
+            "segment_id": _narrowest(result.segment_id),
+            "element_id": _narrowest(result.element_id),
+        },
         length_unit=result.settings.input.length_unit,
         progress=progress,
     )
 
 
-def _narrowed(ids: NDArray[np.int32]) -> NDArray[np.unsignedinteger]:
-    """Ids in as few bytes as hold them: each byte of a point takes its time to compress."""
-    return ids.astype(np.min_scalar_type(int(ids.max(initial=0))))
+def _narrowest(ids: NDArray[np.int32]) -> np.dtype[np.unsignedinteger]:
+    """As few bytes as hold these ids: each byte of a point takes its time to compress."""
+    return np.dtype(np.min_scalar_type(int(ids.max(initial=0))))

@@ -1,6 +1,6 @@
 """``report.html``: the result on one page that needs no other file, to read and to print."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import pipecore
 from pipecore._kernels.grouping import group_by_label
+from pipecore.allocation import BLOCK
 from pipecore.geometry import ArcAxis
 from pipecore.progress import NoProgress, Progress
 from pipecore.report.format import (
@@ -33,6 +34,9 @@ from pipecore.types import (
     PointCloud,
     Result,
 )
+
+POINTS_AT_ONCE = 10_000_000
+"""Points of elements whose rows are held at a time."""
 
 
 @dataclass(frozen=True)
@@ -241,28 +245,49 @@ def _figures(
     # The plot library takes a while to import: only where something is drawn.
     from pipecore.report.figures import draw_deformation  # noqa: PLC0415
 
-    figures = []
-    rows = _rows_of_elements(result, {d.element_id for d in ordered})
-    for done, d in enumerate(ordered):
-        progress.update("drawing figures", done / len(ordered))
-        element = result.element(d.element_id)
-        figures.append(
-            {
+    figures: dict[int, dict[str, Any]] = {}
+    for element_ids in _portions(result, {d.element_id for d in ordered}):
+        rows = _rows_of_elements(result, element_ids)
+        for place_in_report, d in enumerate(ordered):
+            if d.element_id not in rows:
+                continue
+            progress.update("drawing figures", len(figures) / len(ordered))
+            element = result.element(d.element_id)
+            figures[place_in_report] = {
                 "title": f"{d.kind.capitalize()} {d.deformation_id} on {element.label}",
                 "text": " · ".join(_where(d, place)),
                 "verdict": d.verdict,
                 "svg": Markup(draw_deformation(d, cloud, result, rows[d.element_id])),
             }
-        )
     progress.update("drawing figures", 1.0)
-    return figures
+    return [figures[k] for k in range(len(ordered))]
+
+
+def _portions(result: Result, element_ids: set[int]) -> Iterator[set[int]]:
+    """Elements in groups of together at most `POINTS_AT_ONCE` points, or of a single one."""
+    portion: set[int] = set()
+    n_points = 0
+    for i in sorted(element_ids):
+        own = result.element(i).n_points
+        if portion and n_points + own > POINTS_AT_ONCE:
+            yield portion
+            portion, n_points = set(), 0
+        portion.add(i)
+        n_points += own
+    yield portion
 
 
 def _rows_of_elements(result: Result, element_ids: set[int]) -> dict[int, NDArray[np.intp]]:
     """Rows of the points of some elements, found in one pass over the cloud."""
     is_wanted = np.zeros(len(result.elements) + 1, np.bool_)
     is_wanted[list(element_ids)] = True
-    rows = np.flatnonzero(is_wanted[result.element_id])
+    n = len(result.element_id)
+    rows = np.concatenate(
+        [
+            start + np.flatnonzero(is_wanted[result.element_id[start : start + BLOCK]])
+            for start in range(0, max(n, 1), BLOCK)
+        ]
+    )
     owner = result.element_id[rows]
     members, starts = group_by_label(owner, len(is_wanted))
     return {i: rows[members[starts[i] : starts[i + 1]]] for i in element_ids}

@@ -1,8 +1,9 @@
 """How much memory a detection takes in one piece, and how large tiles may be."""
 
+import ctypes
 import math
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -86,13 +87,15 @@ FULL = 0.8
 
 @contextmanager
 def keeping_within(limit: int) -> Iterator[None]:
-    """Give the memory into which files are mapped back whenever the process nears a limit.
+    """Give memory back whenever the process nears a limit.
 
-    What is needed again is read again, mostly from the system's own cache.
+    That is what files are mapped into, which is read again when it is needed, mostly from
+    the system's own cache; and what the C library keeps of arrays that are gone.
     """
     import psutil  # noqa: PLC0415
 
     process, is_over = psutil.Process(), threading.Event()
+    trim = _trimmer()
 
     def look() -> None:
         pause = OFTEN
@@ -100,6 +103,7 @@ def keeping_within(limit: int) -> Iterator[None]:
             pause = OFTEN
             if process.memory_info().rss > FULL * limit:
                 drop_pages()
+                trim()
                 if process.memory_info().rss > FULL * limit:
                     pause = SELDOM
 
@@ -110,3 +114,12 @@ def keeping_within(limit: int) -> Iterator[None]:
     finally:
         is_over.set()
         watch.join()
+
+
+def _trimmer() -> Callable[[], object]:
+    """What makes the C library give freed memory back; only GNU's keeps much of it."""
+    try:
+        trim = ctypes.CDLL(None).malloc_trim
+    except (AttributeError, OSError, TypeError):
+        return lambda: None
+    return lambda: trim(0)
