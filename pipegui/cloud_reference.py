@@ -1,6 +1,5 @@
 """Clouds named by their files, and known again by what is in them. Qt-free."""
 
-import hashlib
 import os
 from dataclasses import dataclass
 from enum import Enum
@@ -9,10 +8,8 @@ from pathlib import Path
 from pipecore.errors import WriteError
 from pipecore.settings import LengthUnit
 from pipegui.document import Scan
+from pipegui.fingerprint import Fingerprint
 from pipegui.texts import tr
-
-N_SAMPLES, SAMPLE_BYTES = 32, 65_536
-"""A fingerprint takes this many samples of a file."""
 
 
 class CloudState(Enum):
@@ -21,33 +18,6 @@ class CloudState(Enum):
     FOUND = "found"
     CHANGED = "changed"
     MISSING = "missing"
-
-
-@dataclass(frozen=True)
-class Fingerprint:
-    """What a file is known again by."""
-
-    size: int
-    mtime_ns: int
-    sample_hash: str
-
-    @classmethod
-    def of(cls, path: Path) -> "Fingerprint":
-        """Take the fingerprint of a file; `OSError` if it cannot be read."""
-        status = path.stat()
-        digest = hashlib.sha256(str(status.st_size).encode())
-        last = max(status.st_size - SAMPLE_BYTES, 0)
-        with path.open("rb") as file:
-            for i in range(N_SAMPLES):
-                file.seek(last * i // max(N_SAMPLES - 1, 1))
-                digest.update(file.read(SAMPLE_BYTES))
-        return cls(status.st_size, status.st_mtime_ns, digest.hexdigest())
-
-    def fits(self, path: Path) -> bool:
-        """Whether a file holds the same; that it was copied or touched does not matter."""
-        if path.stat().st_size != self.size:
-            return False
-        return Fingerprint.of(path).sample_hash == self.sample_hash
 
 
 @dataclass(frozen=True)
@@ -63,7 +33,11 @@ class CloudReference:
 
     @classmethod
     def to(cls, scan: Scan, folder: Path) -> "CloudReference":
-        """Refer to the cloud of a scan from a project's folder; `WriteError` if it has no file."""
+        """Refer to the cloud of a scan from a project's folder; `WriteError` if it has no file.
+
+        The file is known again as it was when the cloud was read: what became of it since
+        is another cloud.
+        """
         source = scan.cloud.source
         if source is None:
             raise WriteError(
@@ -72,12 +46,9 @@ class CloudReference:
                 )
             )
         source = Path(os.path.abspath(source))  # noqa: PTH100 - links stay links
-        try:
-            fingerprint = Fingerprint.of(source)
-        except OSError as error:
-            raise WriteError(
-                tr("The scan “{source}” is no longer there.").format(source=source)
-            ) from error
+        fingerprint = scan.fingerprint or Fingerprint.if_there(source)
+        if fingerprint is None:
+            raise WriteError(tr("The scan “{source}” is no longer there.").format(source=source))
         try:
             relative = os.path.relpath(source, folder).replace(os.sep, "/")
         except ValueError:  # on another drive

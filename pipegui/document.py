@@ -10,6 +10,7 @@ from enum import StrEnum
 
 from pipecore.settings import LengthUnit, Settings
 from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
+from pipegui.fingerprint import Fingerprint
 
 
 class ColourBy(StrEnum):
@@ -154,6 +155,9 @@ class Scan:
 
     length_unit: LengthUnit = LengthUnit.METRE
     """In which the file was read."""
+
+    fingerprint: Fingerprint | None = None
+    """Of the file when the cloud was read; None if nobody took it."""
 
     def review(self, deformation_id: int) -> Review:
         """Return what a person said of a deformation, or that it is open."""

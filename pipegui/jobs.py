@@ -16,6 +16,7 @@ from pipecore.errors import ReadError
 from pipecore.settings import Settings
 from pipecore.types import PointCloud, Result
 from pipegui.document import Scan
+from pipegui.fingerprint import Fingerprint
 from pipegui.texts import tr
 from pipegui.worker import (
     Cancelled,
@@ -145,16 +146,25 @@ class Jobs(QObject):
         """Whether what runs was asked for."""
         return self._running is not None and not self._running.is_glance
 
+    @property
+    def title(self) -> str:
+        """What is being done that was asked for; "" while nothing is."""
+        if self._running is not None and self._is_told_of:
+            return self._running.title
+        return self._waiting[0].title if self._waiting else ""
+
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
         """Read each file as a scan of its own, without waiting for a detection."""
         lane = self if self._running is None or self._running.is_reading else self._side_lane()
         for path in paths:
 
             def work(progress: JobProgress, path: Path = path) -> Scan:
+                fingerprint = Fingerprint.if_there(path)
                 cloud = self.read(path, settings, progress)
                 if not len(cloud):
                     raise ReadError(tr("“{name}” holds no points.").format(name=path.name))
-                return Scan(path.name, cloud, length_unit=settings.input.length_unit)
+                unit = settings.input.length_unit
+                return Scan(path.name, cloud, length_unit=unit, fingerprint=fingerprint)
 
             title = tr("Reading {name}").format(name=path.name)
             lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QDockWidget, QMenu, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDockWidget, QTabWidget, QVBoxLayout, QWidget
 
 from pipegui.panels.clip_bar import ClipBar
 from pipegui.panels.deformation_table import DeformationTable
@@ -120,7 +120,10 @@ def arrange(window: "MainWindow") -> None:
     window.tabifyDockWidget(docks["Stacks"], docks["Settings"])
     docks["Stacks"].raise_()
 
-    window.actions_.menus["View"].addMenu(_panel_menu(window))
+    panel_menu = window.actions_.menus["Panels"]
+    panel_menu.addSeparator()
+    for dock in docks.values():
+        panel_menu.addAction(dock.toggleViewAction())
     _restore(window)
 
 
@@ -130,13 +133,6 @@ def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidget
     dock.setWidget(widget)
     window.panels.docks[title] = dock
     window.addDockWidget(area, dock)
-
-
-def _panel_menu(window: "MainWindow") -> QMenu:
-    menu = QMenu(tr("Panels"), window)
-    for dock in window.panels.docks.values():
-        menu.addAction(dock.toggleViewAction())
-    return menu
 
 
 def _restore(window: "MainWindow") -> None:

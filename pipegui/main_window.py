@@ -11,13 +11,14 @@ from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QToolTi
 from pipecore.errors import PipecoreError
 from pipecore.types import PointCloud, Result
 from pipegui import commands, describe, files, theme, wiring
-from pipegui.actions import VIEW_OPTIONS, Actions
+from pipegui.actions import Actions
 from pipegui.document import Background, ColourBy, Document, Scan, Tool
 from pipegui.edits import Edits, conditions
 from pipegui.history import History
 from pipegui.jobs import Jobs
 from pipegui.layout import LAYOUT_VERSION, Panels, arrange
 from pipegui.menu_actions import MenuActions
+from pipegui.menus import VIEW_OPTIONS
 from pipegui.panels.project_tree import NodeKind
 from pipegui.panels.status import StatusBar
 from pipegui.parts import Parts
@@ -75,6 +76,7 @@ class MainWindow(QMainWindow):
         wiring.connect_views(self)
         wiring.connect_previews(self)
         wiring.connect_jobs(self)
+        wiring.keep_choices(self)
         QApplication.styleHints().colorSchemeChanged.connect(self.refresh_colours)
         self._apply(resolve(self.history.document), everything=True)
         self.menu_actions.restore_appearance()

@@ -28,6 +28,7 @@ from pipecore.settings import Settings
 from pipecore.types import Deformation, Element, Profiles, Result, Review, Stack
 from pipegui.cloud_reference import CloudReference, CloudState
 from pipegui.document import Document, Scan, Selection, ViewOptions
+from pipegui.fingerprint import Fingerprint
 from pipegui.plain import from_plain, to_plain
 from pipegui.project_check import check_result
 from pipegui.texts import tr
@@ -56,7 +57,9 @@ class SavedScan:
     result: Result | None
     reviews: Mapping[int, Review]
 
-    def with_cloud(self, cloud: pipecore.PointCloud) -> Scan:
+    def with_cloud(
+        self, cloud: pipecore.PointCloud, fingerprint: Fingerprint | None = None
+    ) -> Scan:
         """Return the scan with its cloud; `ProjectError` if that does not fit."""
         if len(cloud) != self.cloud.n_points:
             raise ProjectError(
@@ -78,7 +81,7 @@ class SavedScan:
                     "it is another scan, or was read in another unit."
                 ).format(source=cloud.source, name=self.name)
             )
-        return Scan(self.name, cloud, result, self.reviews, self.cloud.length_unit)
+        return Scan(self.name, cloud, result, self.reviews, self.cloud.length_unit, fingerprint)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from pipecore.errors import CancelledError, ReadError
 from pipegui import files
 from pipegui.cloud_reference import CloudState
 from pipegui.document import Document, Scan
+from pipegui.fingerprint import Fingerprint
 from pipegui.jobs import Jobs
 from pipegui.project_file import SUFFIX, SavedProject, read_project, work_of, write_project
 from pipegui.rescue import Rescue
@@ -185,7 +186,29 @@ class Projects(QObject):
 
     def open(self, path: Path) -> None:
         """Open a project in the place of what is open."""
-        self.ask_before(lambda: self._open(path))
+        self.ask_before(lambda: self._ask_to_stop(path, lambda: self._open(path)))
+
+    def _ask_to_stop(self, path: Path, go_on: Callable[[], object]) -> None:
+        """Ask before work is stopped whose scans go; nobody should have to wait for it."""
+        jobs = self._window.jobs
+        if not jobs.is_busy:
+            go_on()
+            return
+        box = self._question(
+            tr("Stop “{title}” and open {name}?").format(title=jobs.title, name=path.name),
+            tr("The project takes the place of what is open."),
+        )
+        stop = box.addButton(tr("Stop and open"), Role.AcceptRole)
+        box.addButton(Button.Cancel)
+        box.setDefaultButton(stop)
+
+        def answer(button: Any) -> None:
+            if button is stop:
+                jobs.cancel()
+                go_on()
+
+        box.buttonClicked.connect(answer)
+        box.open()
 
     def _open(self, path: Path) -> None:
         def work(progress: JobProgress) -> SavedProject:
@@ -254,7 +277,7 @@ class Projects(QObject):
         def work(progress: JobProgress) -> tuple[Scan, ...]:
             scans = []
             for number, path in sorted(places.items()):
-                scan = saved.scans[number]
+                scan, fingerprint = saved.scans[number], Fingerprint.if_there(path)
                 unit = {"input.length_unit": scan.cloud.length_unit}
                 try:
                     cloud = read(path, saved.settings.replace(unit), progress)
@@ -264,7 +287,7 @@ class Projects(QObject):
                     raise ReadError(
                         tr("The project was not opened: {error}").format(error=error)
                     ) from error
-                scans.append(scan.with_cloud(replace(cloud, source=path)))
+                scans.append(scan.with_cloud(replace(cloud, source=path), fingerprint))
             return tuple(scans)
 
         self._window.jobs.run(

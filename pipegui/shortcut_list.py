@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipegui import theme
-from pipegui.actions import MENUS
+from pipegui.menus import MENUS
 from pipegui.texts import mark, plain_title, tr
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
 from pipegui import commands, cuts, describe, edit_commands, files, theme, view_commands
-from pipegui.actions import VIEW_OPTIONS
 from pipegui.document import Background, Tool
+from pipegui.kept_choices import keep, keep_tab
+from pipegui.menus import VIEW_OPTIONS
 from pipegui.panel_focus import go_to_next_panel
 from pipegui.presets import Presets
 from pipegui.texts import LANGUAGES, tr
@@ -111,10 +112,6 @@ def connect_panels(window: "MainWindow") -> None:
     panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
     panels.table.reviewed.connect(lambda ids, state: do(commands.set_review, ids, state))
     panels.table.commented.connect(lambda i, text: do(commands.set_comment, i, text))
-    panels.table.show_columns(str(window.stored.value("table/columns", "")).split())
-    panels.table.columns_changed.connect(
-        lambda keys: window.stored.setValue("table/columns", " ".join(keys))
-    )
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
     panels.settings.keys_reset.connect(lambda keys: do(commands.reset_keys, keys))
     panels.settings.presets.chosen.connect(lambda settings: do(commands.apply_preset, settings))
@@ -221,6 +218,22 @@ def _take_points(window: "MainWindow") -> None:
     window.do(view_commands.delete_measurement, -1)
     if window.document.view.tool is Tool.MEASURE:
         window.do(view_commands.choose_tool, Tool.MEASURE)
+
+
+def keep_choices(window: "MainWindow") -> None:
+    """Show plots and table as they were left last time."""
+    parts, table = window.parts, window.panels.table
+    keep(
+        window.stored,
+        {
+            "radius": parts.radius_plot,
+            "section": parts.section,
+            "columns": table.columns,
+            "filters": table.filters,
+        },
+    )
+    assert window.panels.plots is not None
+    keep_tab(window.stored, window.panels.plots)
 
 
 def connect_jobs(window: "MainWindow") -> None:

@@ -21,8 +21,8 @@ from pipecore.rules import list_rules
 from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
 from pipecore.types import DeformationKind, ElementKind, ReviewState, Verdict
 from pipegui import theme
-from pipegui.actions import MENUS, SPECS
 from pipegui.document import Background, ColourBy
+from pipegui.menus import MENUS, SPECS
 from pipegui.presets import Presets
 from pipegui.texts import DOMAIN, LANGUAGES
 

@@ -296,4 +296,6 @@ COLUMNS = (
     ),
 )
 INDEX = {column.key: i for i, column in enumerate(COLUMNS)}
+EXPENDABLE = ("width_mm", "length_mm", "ovality_pct", "depth_pct_od", "clock", "deformation_id")
+"""Shown at first, but left out of a narrow table, the first first; the properties have them."""
 SHOWN_FIRST = tuple(column.key for column in COLUMNS if column.is_shown_first)

@@ -1,15 +1,13 @@
 """The deformation panel: table, filters, columns, reviewing, copying."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QEvent, QItemSelectionModel, QModelIndex, Qt, Signal
 from PySide6.QtGui import QAction, QGuiApplication, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QHBoxLayout,
-    QLabel,
     QMenu,
     QStackedLayout,
     QStyledItemDelegate,
@@ -18,16 +16,18 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipecore.types import DeformationKind, ReviewState, Verdict
+from pipecore.types import ReviewState
 from pipegui import describe, theme
-from pipegui.panels.deformation_columns import COLUMNS, INDEX, SHOWN_FIRST
+from pipegui.panels.deformation_columns import COLUMNS, INDEX
+from pipegui.panels.deformation_filters import FilterBar
 from pipegui.panels.deformation_model import (
     REVIEW_COLUMN,
     REVIEW_ICON,
     DeformationFilter,
     DeformationModel,
 )
-from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, QuietSpinBox
+from pipegui.panels.table_columns import TableColumns
+from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
 from pipegui.texts import mark, tr
 from pipegui.view_state import TableState
 
@@ -35,24 +35,10 @@ WAITING = mark(
     "Dents, bulges and other deformations appear here once pipes are detected.\n"
     "Open a scan and press Detect (Ctrl+D)."
 )
-ROOM = {"review": 12 * theme.SPACING, "comment": 24 * theme.SPACING}
-"""Least widths of the columns that are still to be filled, in pixels."""
 DECISIONS = {
     ReviewState.ACCEPTED: mark("Accept"),
     ReviewState.REJECTED: mark("Reject"),
     ReviewState.OPEN: mark("Leave open"),
-}
-
-FILTERS = {
-    "kind": (mark("Show only deformations of one kind"), mark("All kinds")),
-    "verdict": (mark("Show only deformations of one verdict"), mark("All verdicts")),
-    "review": (mark("Show only deformations of one review"), mark("Any review")),
-}
-"""Tip of each filter by a choice, and what stands for everything."""
-FILTER_NAMES = {
-    "kind": mark("Filter by kind"),
-    "verdict": mark("Filter by verdict"),
-    "review": mark("Filter by review"),
 }
 
 
@@ -64,8 +50,6 @@ class DeformationTable(QWidget):
     reviewed = Signal(list, object)
     """Ids of deformations and what was decided, a `ReviewState`."""
     commented = Signal(int, str)
-    columns_changed = Signal(list)
-    """Keys of the columns that are shown, in their order."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -77,9 +61,10 @@ class DeformationTable(QWidget):
         self.proxy = DeformationFilter(self)
         self.proxy.setSourceModel(self.model)
         self.view = self._make_view()
+        self.columns = TableColumns(self.view)
         self.menu = self._make_menu()
-        self.show_columns(SHOWN_FIRST)
-        self._make_filters()
+        self.filters = FilterBar()
+        self.filters.choices_changed.connect(self._filter)
         self._empty = EmptyHint(tr(WAITING))
         self._lay_out()
         self.apply(self._state)
@@ -100,20 +85,9 @@ class DeformationTable(QWidget):
         view.setIconSize(theme.icon_size(2))
         view.verticalHeader().hide()
         view.verticalHeader().setDefaultSectionSize(round(3.5 * theme.SPACING))
-        header = view.horizontalHeader()
-        header.setHighlightSections(False)
-        header.setStretchLastSection(True)
-        header.setSectionsMovable(True)
-        header.setToolTip(tr("Click: sort. Drag: move. Right click: choose columns"))
-        # No column: the model's own order, which is by verdict, the deepest first.
-        header.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)
-        header.setSortIndicatorClearable(True)
-        header.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
-        header.customContextMenuRequested.connect(
-            lambda at: self.column_menu.popup(header.mapToGlobal(at))
+        view.horizontalHeader().setToolTip(
+            tr("Click: sort. Drag: move. Right click: choose columns")
         )
-        header.sectionMoved.connect(self._tell_columns)
-        view.setSortingEnabled(True)
         view.selectionModel().currentRowChanged.connect(self._tell)
         view.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         view.customContextMenuRequested.connect(
@@ -134,16 +108,7 @@ class DeformationTable(QWidget):
         every = QKeySequence.StandardKey.SelectAll
         self._add_keyed(menu, tr("Select all"), every, self.view.selectAll)
         menu.addSeparator()
-        self.column_menu = QMenu(tr("Columns"), self)
-        self.column_actions: dict[str, QAction] = {}
-        for column in COLUMNS:
-            title = tr("Number") if column.title == "#" else tr(column.title)
-            action = self.column_actions[column.key] = self.column_menu.addAction(title)
-            action.setCheckable(True)
-            action.toggled.connect(lambda on, key=column.key: self._show_column(key, on))
-        self.column_menu.addSeparator()
-        self.column_menu.addAction(tr("As at first"), self._reset_columns)
-        menu.addMenu(self.column_menu)
+        menu.addMenu(self.columns.menu)
         return menu
 
     def _add_keyed(
@@ -156,50 +121,12 @@ class DeformationTable(QWidget):
         self.view.addAction(action)
         menu.addAction(action)
 
-    def _make_filters(self) -> None:
-        self.kind = self._filter_choice("kind", [(tr(k), k, None) for k in DeformationKind])
-        verdicts = [(tr(v), v, theme.verdict_icon(v)) for v in Verdict]
-        self.verdict = self._filter_choice("verdict", verdicts)
-        states = [(tr(s), s, theme.icon(REVIEW_ICON[s])) for s in ReviewState]
-        self.state = self._filter_choice("review", states)
-        self.min_depth = QuietSpinBox()
-        self.min_depth.setAccessibleName(tr("Filter by depth"))
-        self.min_depth.setToolTip(tr("Hide what is shallower"))
-        self.min_depth.setRange(0, 1000)
-        self.min_depth.setPrefix("≥ ")
-        self.min_depth.setSuffix(" mm")
-        self.min_depth.setSpecialValueText(tr("any depth"))
-        self.min_depth.valueChanged.connect(self._filter)
-        self.counts = QLabel()
-        self.counts.setProperty("muted", True)
-
-    def _filter_choice(self, what: str, choices: Sequence[tuple[str, Any, Any]]) -> QuietComboBox:
-        tip, every = map(tr, FILTERS[what])
-        combo = QuietComboBox()
-        combo.setAccessibleName(tr(FILTER_NAMES[what]))
-        combo.setToolTip(tip)
-        combo.addItem(every, None)
-        for text, value, icon in choices:
-            if icon is None:
-                combo.addItem(text, value)
-            else:
-                combo.addItem(icon, text, value)
-        combo.currentIndexChanged.connect(self._filter)
-        return combo
-
     def _lay_out(self) -> None:
-        filters = QHBoxLayout()
-        filters.setContentsMargins(theme.SPACING, theme.SPACING // 2, theme.SPACING, 4)
-        filters.setSpacing(theme.SPACING)
-        for widget in (self.kind, self.verdict, self.state, self.min_depth):
-            filters.addWidget(widget)
-        filters.addStretch()
-        filters.addWidget(self.counts)
         table = QWidget()
         column = QVBoxLayout(table)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(0)
-        column.addLayout(filters)
+        column.addWidget(self.filters)
         column.addWidget(self.view)
         self._stack = QStackedLayout(self)
         self._stack.addWidget(self._empty)
@@ -213,7 +140,7 @@ class DeformationTable(QWidget):
             is_new = state.result is not before.result
             if is_new:
                 self.model.set_result(state.result, state.reviews)
-                self._fit_columns()
+                self.columns.fit()
             elif state.reviews != before.reviews:
                 self.model.set_reviews(state.reviews)
             if is_new or state.selected != before.selected:
@@ -228,8 +155,6 @@ class DeformationTable(QWidget):
         if event.type() == QEvent.Type.PaletteChange:
             for state, action in self.decisions.items():
                 action.setIcon(theme.icon(REVIEW_ICON[state]))
-                row = self.state.findData(state)
-                self.state.setItemIcon(row, theme.icon(REVIEW_ICON[state]))
         super().changeEvent(event)
 
     def _show_selected(self) -> None:
@@ -241,73 +166,21 @@ class DeformationTable(QWidget):
         if index.isValid():
             if current.row() == index.row() and selection.isRowSelected(index.row()):
                 return  # the cell that the user is in stays current, and others selected
-            index = index.siblingAtColumn(max(current.column(), self._first_column()))
+            index = index.siblingAtColumn(max(current.column(), self.columns.first))
             selection.setCurrentIndex(index, flags.ClearAndSelect | flags.Rows)
             self.view.scrollTo(index)
         else:
             selection.clear()
-
-    # Columns
-
-    @property
-    def shown_columns(self) -> list[str]:
-        """Keys of the columns that are shown, in their order."""
-        header = self.view.horizontalHeader()
-        order = [header.logicalIndex(i) for i in range(header.count())]
-        return [COLUMNS[i].key for i in order if not header.isSectionHidden(i)]
-
-    def show_columns(self, keys: Sequence[str]) -> None:
-        """Show these columns in this order; unknown ones are passed over."""
-        known = [key for key in dict.fromkeys(keys) if key in INDEX] or list(SHOWN_FIRST)
-        header = self.view.horizontalHeader()
-        order = list(known)
-        for i, column in enumerate(COLUMNS):
-            if column.key not in order:  # hidden ones wait beside their neighbours
-                order.insert(order.index(COLUMNS[i - 1].key) + 1 if i else 0, column.key)
-        with self._applying:
-            for place, key in enumerate(order):
-                header.moveSection(header.visualIndex(INDEX[key]), place)
-            for key, column in INDEX.items():
-                header.setSectionHidden(column, key not in known)
-                self.column_actions[key].setChecked(key in known)
-            self._fit_columns()
-
-    def _show_column(self, key: str, shown: bool) -> None:
-        if self._applying:
-            return
-        self.view.setColumnHidden(INDEX[key], not shown)
-        if not self.shown_columns:  # a table without columns could not be mended
-            self.column_actions[key].setChecked(True)
-            return
-        self.view.resizeColumnToContents(INDEX[key])
-        self._tell_columns()
-
-    def _reset_columns(self) -> None:
-        self.show_columns(SHOWN_FIRST)
-        self._tell_columns()
-
-    def _tell_columns(self, *_: object) -> None:
-        if not self._applying:
-            self.columns_changed.emit(self.shown_columns)
-
-    def _first_column(self) -> int:
-        return INDEX[self.shown_columns[0]]
-
-    def _fit_columns(self) -> None:
-        self.view.resizeColumnsToContents()
-        for key, width in ROOM.items():
-            column = INDEX[key]
-            self.view.setColumnWidth(column, max(self.view.columnWidth(column), width))
 
     # Filtering
 
     def _filter(self) -> None:
         with self._applying:
             self.proxy.set_filter(
-                self.kind.currentData(),
-                self.verdict.currentData(),
-                self.min_depth.value(),
-                self.state.currentData(),
+                self.filters.kind.currentData(),
+                self.filters.verdict.currentData(),
+                self.filters.min_depth.value(),
+                self.filters.review.currentData(),
             )
             self._show_selected()
         self._count()
@@ -331,7 +204,7 @@ class DeformationTable(QWidget):
         n_open = sum(self.model.review(r).state is ReviewState.OPEN for r in rows)
         if n_open < len(rows):
             parts.append(tr("{n} open").format(n=n_open))
-        self.counts.setText(" · ".join(parts))
+        self.filters.counts.setText(" · ".join(parts))
 
     # What the user does
 
@@ -352,7 +225,7 @@ class DeformationTable(QWidget):
 
     def copy(self) -> None:
         """Copy the selected rows (all, if none is) as plain numbers with a header."""
-        keys = self.shown_columns
+        keys = self.columns.shown
         lines = ["\t".join(COLUMNS[INDEX[key]].copied_title for key in keys)]
         for row in self._selected_rows() or self._shown_rows():
             cells = [self.model.plain(row, INDEX[key]) for key in keys]

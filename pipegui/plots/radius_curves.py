@@ -1,6 +1,6 @@
 """What the radius plot shows of one element: its points, their range, and them as numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,14 @@ from PySide6.QtGui import QColor
 from pipecore.geometry import Array
 from pipecore.report.format import cell
 from pipecore.types import Element, Profiles
+from pipegui import theme
+from pipegui.colour_maps import QUALITATIVE
+from pipegui.colours import VERDICT
+from pipegui.cuts import DentLimit
+from pipegui.plots.chart import faint
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import Pattern
+from pipegui.texts import format_measure, label_of, tr
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,3 +68,34 @@ def key_of(sign: str, colour: QColor, text: str) -> str:
     """Part of the key: a sign in its colour and what it stands for."""
     coloured = f'<span style="color:{colour.name()}">{sign}</span>'
     return f"{coloured}&nbsp;{text.replace(' ', '&nbsp;')}" if text else coloured
+
+
+def legend(
+    curve: Curve,
+    pinned: Sequence[Curve],
+    shows: Callable[[str], bool],
+    limit: DentLimit | None,
+) -> str:
+    """What the lines and points of the plot are, as rich text."""
+    pattern, data = curve.pattern, curve.colour
+    spread = format_measure(pattern.spread, unit="mm", decimals=2)
+    scatter = tr("scatter ± {spread}").format(spread=spread)
+    if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
+        middle = format_measure(pattern.middle, decimals=2)
+        scatter = tr("median {middle}, {scatter}").format(middle=middle, scatter=scatter)
+    parts = []
+    if shows("semi_minor"):
+        name = tr("semi-minor axis") if not pinned else label_of(curve.element)
+        parts.append(key_of("●", data, name))
+    parts += [key_of("●", c.colour, label_of(c.element)) for c in pinned]
+    if shows("free_radius"):
+        violet = QColor(*QUALITATIVE[-1].tolist())
+        parts.append(key_of("◇", violet, tr("free circle")))
+    if shows("fitted"):
+        parts.append(key_of("━", theme.colour("text"), tr("fitted")))
+    if shows("band"):
+        parts.append(key_of("╍", data, "") + key_of("▒", faint(data, 1), scatter))
+    if shows("limit") and limit is not None:
+        text = tr("limit for dents {depth:.1f} mm").format(depth=1000 * limit.depth)
+        parts.append(key_of("╍", QColor(VERDICT["reject"]), text))
+    return "&nbsp; ".join(parts)

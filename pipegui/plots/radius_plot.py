@@ -1,14 +1,16 @@
 """Radius against profile of the selected element, as the paper draws it, and of pinned ones."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QFontMetrics
+from PySide6.QtGui import QColor, QFontMetrics
 from PySide6.QtWidgets import (
     QComboBox,
     QGraphicsSimpleTextItem,
     QLabel,
-    QMenu,
     QToolButton,
     QWidget,
 )
@@ -19,10 +21,11 @@ from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.colours import VERDICT
 from pipegui.plots import drawing
-from pipegui.plots.chart import Chart, faint, small
+from pipegui.plots.chart import Chart, small
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import index_at, pattern_of
-from pipegui.plots.radius_curves import Curve, key_of, range_of, table_of
+from pipegui.plots.radius_curves import Curve, legend, range_of, table_of
+from pipegui.plots.series_menu import SeriesMenu
 from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.view_state import RadiusPlotState
 
@@ -56,6 +59,7 @@ class RadiusPlot(Chart):
     pin_toggled = Signal()
     """The present element is to stay in the plot, or is not to any more."""
     pins_cleared = Signal()
+    choices_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
@@ -89,19 +93,12 @@ class RadiusPlot(Chart):
         self.x_axis.addItems([tr(name) for name in X_AXES])
         self.x_axis.setAccessibleName(tr("Plot against"))
         self.x_axis.setToolTip(tr("What the profiles are plotted against"))
-        self.x_axis.currentIndexChanged.connect(self._change_axis)
+        self.x_axis.currentIndexChanged.connect(self._redraw)
         self.pin = self.tool_button(tr("Pin: keep this element in the plot"), "pin-outline")
         self.pin.setCheckable(True)
         self.pin.clicked.connect(lambda _: self.pin_toggled.emit())
-        self.shown_menu = QMenu(self)
-        self.shown: dict[str, QAction] = {}
-        for name, text in SERIES.items():
-            if name in ("centre", "difference"):
-                self.shown_menu.addSeparator()
-            action = self.shown[name] = self.shown_menu.addAction(tr(text))
-            action.setCheckable(True)
-            action.setChecked(name in AT_FIRST)
-            action.toggled.connect(self._change_shown)
+        self.shown_menu = SeriesMenu(SERIES, AT_FIRST, ("centre", "difference"), self)
+        self.shown_menu.changed.connect(self._redraw)
         self.shown_menu.addSeparator()
         self.shown_menu.addAction(tr("Take all pins off"), self.pins_cleared.emit)
         self.shown_button = self.tool_button(tr("What is plotted"), "tune-variant")
@@ -153,19 +150,29 @@ class RadiusPlot(Chart):
     def _choose_stack(self, row: int) -> None:
         self.stack_chosen.emit(self.stacks.itemData(row))
 
-    def _change_axis(self) -> None:
+    def _redraw(self) -> None:
         self._draw()
         self.fit()
+        self.choices_changed.emit()
 
-    def _change_shown(self) -> None:
-        self._draw()
-        self.fit()
+    # Kept from one session to the next
+
+    def choices(self) -> dict[str, Any]:
+        """What is plotted against what."""
+        against = list(X_AXES)[self.x_axis.currentIndex()]
+        return {"shown": self.shown_menu.shown, "against": against}
+
+    def choose(self, choices: Mapping[str, Any]) -> None:
+        """Plot as it was."""
+        self.shown_menu.choose(choices.get("shown"))
+        if (against := choices.get("against")) in list(X_AXES):
+            self.x_axis.setCurrentIndex(list(X_AXES).index(against))
 
     # Numbers
 
     def shows(self, name: str) -> bool:
         """Whether one of `SERIES` is shown."""
-        return self.shown[name].isChecked()
+        return self.shown_menu.shows(name)
 
     @property
     def _is_by_chainage(self) -> bool:
@@ -297,30 +304,9 @@ class RadiusPlot(Chart):
         return 100 * curve.profiles.ovality
 
     def _describe(self, curve: Curve) -> None:
-        pattern, data = curve.pattern, curve.colour
-        spread = format_measure(pattern.spread, unit="mm", decimals=2)
-        scatter = tr("scatter ± {spread}").format(spread=spread)
-        if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
-            middle = format_measure(pattern.middle, decimals=2)
-            scatter = tr("median {middle}, {scatter}").format(middle=middle, scatter=scatter)
-        parts = []
-        if self.shows("semi_minor"):
-            name = tr("semi-minor axis") if not self._pinned else label_of(curve.element)
-            parts.append(key_of("●", data, name))
-        parts += [key_of("●", c.colour, label_of(c.element)) for c in self._pinned]
-        if self.shows("free_radius"):
-            violet = QColor(*QUALITATIVE[-1].tolist())
-            parts.append(key_of("◇", violet, tr("free circle")))
-        if self.shows("fitted"):
-            parts.append(key_of("━", theme.colour("text"), tr("fitted")))
-        if self.shows("band"):
-            parts.append(key_of("╍", data, "") + key_of("▒", faint(data, 1), scatter))
         limit = self._state.dent_limit
-        if self.shows("limit") and limit is not None:
-            text = tr("limit for dents {depth:.1f} mm").format(depth=1000 * limit.depth)
-            parts.append(key_of("╍", QColor(VERDICT["reject"]), text))
-            self.key.setToolTip(limit.text)
-        self.key.setText("&nbsp; ".join(parts))
+        self.key.setText(legend(curve, self._pinned, self.shows, limit))
+        self.key.setToolTip(limit.text if limit is not None and self.shows("limit") else "")
 
     def fit(self) -> None:
         """Show all points with a margin; a few wild ones must not flatten the rest."""

@@ -1,10 +1,13 @@
 """One profile: its points, its ellipse and curve, the undeformed contour, in millimetres."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QKeyEvent
-from PySide6.QtWidgets import QLabel, QMenu, QSlider, QToolButton, QWidget
+from PySide6.QtGui import QColor, QKeyEvent
+from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
 from pipecore.report.format import cell
@@ -14,6 +17,7 @@ from pipegui.plots.chart import Chart, faint
 from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensions_text
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
 from pipegui.plots.export import Table
+from pipegui.plots.series_menu import SeriesMenu
 from pipegui.section_cut import Ellipse, SectionCut
 from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.view_state import SectionState
@@ -46,6 +50,7 @@ class SectionView(Chart):
 
     step_requested = Signal(int)
     """How many profiles further: -1 or 1, or many."""
+    choices_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
@@ -77,16 +82,11 @@ class SectionView(Chart):
         self.factor.setAccessibleName(tr("Exaggeration"))
         self.factor.setToolTip(tr("Draws deviations from the undeformed contour larger"))
         self.factor.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.factor.valueChanged.connect(self._redraw)
+        self.factor.valueChanged.connect(self._change)
         self.factor_text = QLabel("1×")
         self.factor_text.setMinimumWidth(self.fontMetrics().horizontalAdvance("20×"))
-        self.layer_menu = QMenu(self)
-        self.layers: dict[str, QAction] = {}
-        for name, text in LAYERS.items():
-            action = self.layers[name] = self.layer_menu.addAction(tr(text))
-            action.setCheckable(True)
-            action.setChecked(name in AT_FIRST)
-            action.toggled.connect(self._redraw)
+        self.layer_menu = SeriesMenu(LAYERS, AT_FIRST, parent=self)
+        self.layer_menu.changed.connect(self._change)
         self.layer_button = self.tool_button(tr("What is drawn"), "tune-variant")
         self.layer_button.setMenu(self.layer_menu)
         self.layer_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
@@ -122,14 +122,30 @@ class SectionView(Chart):
         if state.element is not before.element or before.profile is None:
             self.fit()
 
-    # Drawing
-
     def _redraw(self) -> None:
         self._draw()
         self.fit()
 
+    def _change(self) -> None:
+        self._redraw()
+        self.choices_changed.emit()
+
     def _shows(self, layer: str) -> bool:
-        return self.layers[layer].isChecked()
+        return self.layer_menu.shows(layer)
+
+    # Kept from one session to the next
+
+    def choices(self) -> dict[str, Any]:
+        """What is drawn, and how much deviations are enlarged."""
+        return {"shown": self.layer_menu.shown, "exaggeration": self.factor.value()}
+
+    def choose(self, choices: Mapping[str, Any]) -> None:
+        """Draw as it was."""
+        self.layer_menu.choose(choices.get("shown"))
+        if isinstance(factor := choices.get("exaggeration"), int):
+            self.factor.setValue(factor)
+
+    # Drawing
 
     def _draw(self) -> None:
         cut, factor = self._state.cut, self.factor.value()

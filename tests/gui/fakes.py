@@ -75,14 +75,24 @@ class FakeScene(FakeView):
         return self.grab().toImage()
 
 
-class FakeRadiusPlot(FakeView):
+class FakeChooser(FakeView):
+    choices_changed = Signal()
+
+    def choices(self) -> dict[str, Any]:
+        return {}
+
+    def choose(self, choices: Any) -> None:
+        raise AssertionError("nothing was chosen")
+
+
+class FakeRadiusPlot(FakeChooser):
     profile_clicked = Signal(int, int)
     stack_chosen = Signal(int)
     pin_toggled = Signal()
     pins_cleared = Signal()
 
 
-class FakeSection(FakeView):
+class FakeSection(FakeChooser):
     step_requested = Signal(int)
 
 

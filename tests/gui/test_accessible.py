@@ -136,7 +136,7 @@ def test_that_f6_goes_from_panel_to_panel_and_back(whole, qtbot):
 def test_that_the_list_of_keys_names_all_of_them(whole, qtbot):
     from PySide6.QtWidgets import QDialog, QDialogButtonBox
 
-    from pipegui.actions import SPECS
+    from pipegui.menus import SPECS
 
     qtbot.keyClick(whole, Qt.Key.Key_F1)
     dialog = whole.findChild(QDialog, "shortcuts")

@@ -7,7 +7,7 @@ from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QLineEdit
 
 from pipecore.types import Review, ReviewState
-from pipegui.panels.deformation_columns import COLUMNS, INDEX, SHOWN_FIRST
+from pipegui.panels.deformation_columns import COLUMNS, EXPENDABLE, INDEX, SHOWN_FIRST
 from pipegui.panels.deformation_model import DeformationFilter, DeformationModel
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.view_state import TableState
@@ -114,9 +114,9 @@ def test_that_reviews_are_shown_counted_and_filtered(table, qtbot):
     row = table.model.row_of(2)
     shown = [table.model.index(row, INDEX[key]).data() for key in ("review", "comment")]
     assert shown == ["accepted", "old"]
-    assert table.counts.text().endswith("2 open")
-    qtbot.keyClicks(table.state, "rejected")
-    assert table.counts.text().startswith("1 of 4 shown")
+    assert table.filters.counts.text().endswith("2 open")
+    qtbot.keyClicks(table.filters.review, "rejected")
+    assert table.filters.counts.text().startswith("1 of 4 shown")
 
 
 def test_that_a_review_keeps_the_cell_that_one_is_in(table, qtbot):
@@ -130,46 +130,72 @@ def test_that_a_review_keeps_the_cell_that_one_is_in(table, qtbot):
 
 
 def test_that_columns_are_chosen_and_remembered(table, qtbot):
-    with qtbot.waitSignal(table.columns_changed) as told:
-        table.column_actions["area_cm2"].trigger()
-    assert "area_cm2" in told.args[0]
-    with qtbot.waitSignal(table.columns_changed):
-        table.column_actions["width_mm"].trigger()
+    with qtbot.waitSignal(table.columns.choices_changed):
+        table.columns.actions["area_cm2"].trigger()
+    assert "area_cm2" in table.columns.choices()["columns"]
+    with qtbot.waitSignal(table.columns.choices_changed):
+        table.columns.actions["width_mm"].trigger()
     header = table.view.horizontalHeader()
     header.moveSection(header.visualIndex(INDEX["comment"]), 0)
-    shown = table.shown_columns
+    shown = table.columns.shown
     assert shown[0] == "comment"
     assert "width_mm" not in shown
     another = DeformationTable()
     qtbot.addWidget(another)
-    another.show_columns(shown)
-    assert another.shown_columns == shown
+    another.columns.show(shown)
+    assert another.columns.shown == shown
 
 
 def test_that_the_last_column_cannot_be_hidden_and_all_come_back(table):
-    for key in list(table.shown_columns):
-        table.column_actions[key].setChecked(False)
-    assert len(table.shown_columns) == 1
-    table.column_menu.actions()[-1].trigger()
-    assert table.shown_columns == list(SHOWN_FIRST)
+    for key in list(table.columns.shown):
+        table.columns.actions[key].setChecked(False)
+    assert len(table.columns.shown) == 1
+    table.columns.menu.actions()[-1].trigger()
+    assert table.columns.shown == list(SHOWN_FIRST)
+
+
+@pytest.mark.parametrize("width", [1600, 1022, 700, 400])
+def test_that_without_a_choice_the_columns_need_no_scrolling(table, qtbot, width):
+    table.resize(width, 300)
+    header, viewport = table.view.horizontalHeader(), table.view.viewport()
+    qtbot.waitUntil(lambda: viewport.width() > width - 40)
+    assert header.length() <= viewport.width()
+    left_out = set(SHOWN_FIRST) - set(table.columns.shown)
+    assert left_out == set(EXPENDABLE[: len(left_out)])
+    assert bool(left_out) == (width < 1000)
+    for key in table.columns.shown:
+        assert table.columns.actions[key].isChecked()
+
+
+def test_that_chosen_columns_stay_however_narrow_the_table(table):
+    table.columns.show(list(SHOWN_FIRST))
+    table.resize(400, 300)
+    assert table.columns.shown == list(SHOWN_FIRST)
+
+
+def test_that_only_the_sorted_column_has_room_for_its_arrow(table):
+    widths = {key: table.view.columnWidth(INDEX[key]) for key in table.columns.shown}
+    table.view.sortByColumn(INDEX["clock"], Qt.SortOrder.AscendingOrder)
+    wider = {k for k, w in widths.items() if table.view.columnWidth(INDEX[k]) > w}
+    assert wider - {"comment"} == {"clock"}
 
 
 def test_that_columns_of_another_version_do_no_harm(table):
-    table.show_columns(["no such column", "depth_mm"])
-    assert table.shown_columns == ["depth_mm"]
-    table.show_columns([])
-    assert set(table.shown_columns) == set(SHOWN_FIRST)
+    table.columns.show(["no such column", "depth_mm"])
+    assert table.columns.shown == ["depth_mm"]
+    table.columns.show([])
+    assert set(table.columns.shown) == set(SHOWN_FIRST)
 
 
 def test_that_a_right_click_on_the_header_offers_the_columns(table, qtbot):
     header = table.view.horizontalHeader()
     header.customContextMenuRequested.emit(QPoint(5, 5))
-    qtbot.waitUntil(table.column_menu.isVisible)
-    table.column_menu.close()
+    qtbot.waitUntil(table.columns.menu.isVisible)
+    table.columns.menu.close()
 
 
 def test_that_what_is_shown_is_copied_in_the_order_shown(table, qtbot):
-    table.show_columns(["depth_mm", "deformation_id", "comment"])
+    table.columns.show(["depth_mm", "deformation_id", "comment"])
     table.apply(TableState(RESULT, 1, {1: Review(comment="two\tlines\nhere")}))
     table.view.setFocus()
     qtbot.keyClick(table.view, Qt.Key.Key_A, CTRL)

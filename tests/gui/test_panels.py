@@ -205,14 +205,14 @@ def _point(x, y):
 def test_that_the_filters_leave_out_and_count(qtbot):
     table = show(qtbot, DeformationTable(), (1000, 300))
     table.apply(TableState(make_result()))
-    assert table.counts.text() == "4 shown · 1 to reject · 3 to review"
-    qtbot.keyClicks(table.kind, "dent")
-    assert table.counts.text() == "2 of 4 shown · 1 to reject · 1 to review"
-    table.min_depth.setFocus()
-    table.min_depth.selectAll()
-    qtbot.keyClicks(table.min_depth, "10")
-    qtbot.keyClick(table.min_depth, Qt.Key.Key_Return)
-    assert table.counts.text() == "1 of 4 shown · 1 to reject"
+    assert table.filters.counts.text() == "4 shown · 1 to reject · 3 to review"
+    qtbot.keyClicks(table.filters.kind, "dent")
+    assert table.filters.counts.text() == "2 of 4 shown · 1 to reject · 1 to review"
+    table.filters.min_depth.setFocus()
+    table.filters.min_depth.selectAll()
+    qtbot.keyClicks(table.filters.min_depth, "10")
+    qtbot.keyClick(table.filters.min_depth, Qt.Key.Key_Return)
+    assert table.filters.counts.text() == "1 of 4 shown · 1 to reject"
 
 
 def test_that_a_click_on_a_row_tells_its_deformation(qtbot):

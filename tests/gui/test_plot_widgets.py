@@ -238,7 +238,7 @@ def test_that_exaggeration_keeps_all_in_view(section):
 @pytest.mark.parametrize("layer", ["points", "curve", "ellipse", "reference", "dimensions"])
 def test_that_layers_of_the_section_can_be_left_out(section, layer):
     n_items = len(section.plot.items)
-    section.layers[layer].setChecked(False)
+    section.layer_menu.series[layer].setChecked(False)
     assert len(section.plot.items) < n_items
 
 
@@ -284,7 +284,7 @@ def test_that_the_seventh_pin_takes_the_first_one_off():
 
 
 def test_that_differences_from_the_fitted_radius_lie_about_zero(radius):
-    radius.shown["difference"].setChecked(True)
+    radius.shown_menu.series["difference"].setChecked(True)
     low, high = radius.radius.viewRange()[1]
     assert low < 0 < high
     assert high - low < 40
@@ -299,11 +299,11 @@ def test_that_the_rules_limit_is_that_of_the_elements_own_diameter():
 def test_that_what_is_not_wanted_is_not_drawn(radius):
     n_items = len(radius.radius.items)
     for name in ("semi_minor", "fitted", "band", "limit"):
-        radius.shown[name].setChecked(False)
+        radius.shown_menu.series[name].setChecked(False)
         assert len(radius.radius.items) < n_items
         n_items = len(radius.radius.items)
     assert radius.offset.isVisible()
-    radius.shown["centre"].setChecked(False)
+    radius.shown_menu.series["centre"].setChecked(False)
     assert not radius.offset.isVisible()
 
 

@@ -14,6 +14,7 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox
 from pipecore.io import read, write_laz
 from pipecore.types import ReviewState
 from pipegui import edit_commands
+from pipegui.cloud_reference import CloudState
 from pipegui.crash_guard import CrashGuard
 from pipegui.document import Document
 from pipegui.project_file import read_project
@@ -58,6 +59,24 @@ def work_on(window, qtbot, laz) -> None:
     qtbot.waitUntil(window.actions_["detect"].isEnabled)
     window.detect()
     qtbot.waitUntil(lambda: window.document.result is not None and not window.jobs.is_busy)
+
+
+@pytest.fixture
+def detecting(make_window, qtbot, laz):
+    """A window in the midst of a detection, and the event that lets it end."""
+    go = threading.Event()
+
+    def slow(cloud, settings, progress):
+        while not go.wait(0.01):
+            progress.update("ellipses", 0.5)
+        return detect(cloud, settings, progress)
+
+    window = make_window(read=read_file, detect=slow)
+    window.open_files([laz])
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
+    window.detect()
+    yield window, go
+    go.set()
 
 
 def is_idle(window) -> bool:
@@ -132,18 +151,8 @@ def test_that_save_as_makes_another_file_and_goes_on_with_it(worked, qtbot, tmp_
     assert worked.projects.path == tmp_path / "b.pipegui"
 
 
-def test_that_saving_need_not_wait_for_a_detection(make_window, qtbot, laz, tmp_path, monkeypatch):
-    go = threading.Event()
-
-    def slow(cloud, settings, progress):
-        while not go.wait(0.01):
-            progress.update("ellipses", 0.5)
-        return detect(cloud, settings, progress)
-
-    window = make_window(read=read_file, detect=slow)
-    window.open_files([laz])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled)
-    window.detect()
+def test_that_saving_need_not_wait_for_a_detection(detecting, qtbot, tmp_path, monkeypatch):
+    window, go = detecting
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(tmp_path / "a"), ""))
     window.actions_["save"].trigger()
     qtbot.waitUntil((tmp_path / "a.pipegui").is_file)
@@ -386,24 +395,70 @@ def test_that_nothing_is_kept_while_there_is_nothing_to_lose(make, qtbot, laz, t
     assert window.document.settings == Document().settings
 
 
-# A second scan meanwhile
+# Clouds that change
+
+
+def change(path: Path) -> None:
+    """Write another scan of as many points into a file."""
+    cloud = make_scan(N)[0]
+    write_laz(path, replace(cloud, xyz=cloud.xyz + np.float32(0.25)))
+
+
+def test_that_a_scan_that_changed_after_it_was_read_is_noticed_when_reopened(
+    worked, qtbot, laz, tmp_path, monkeypatch, make
+):
+    change(laz)
+    path = tmp_path / "job.pipegui"
+    save_to(worked, qtbot, monkeypatch, path)
+    again = make()
+    again.open_files([path])
+    qtbot.waitUntil(lambda: bool(again.findChildren(QMessageBox, "question")))
+    assert "has changed" in question(again).text()
+    press(again, qtbot, "Use it all the same")
+    qtbot.waitUntil(lambda: again.document.scan is not None and is_idle(again))
+    # What is saved from here on knows the scan as it was read now.
+    again.do(edit_commands.rename_element, 2, "Feed line")
+    again.projects.save()
+    qtbot.waitUntil(lambda: is_idle(again) and not again.isWindowModified())
+    assert [state for _, state in read_project(path).located()] == [CloudState.FOUND]
+
+
+def test_that_work_is_saved_although_its_scan_is_gone(worked, qtbot, laz, tmp_path, monkeypatch):
+    laz.unlink()
+    path = tmp_path / "job.pipegui"
+    save_to(worked, qtbot, monkeypatch, path)
+    assert [state for _, state in read_project(path).located()] == [CloudState.MISSING]
+
+
+# Meanwhile
+
+
+def test_that_a_project_need_not_wait_for_a_detection(
+    detecting, make, qtbot, laz, tmp_path, monkeypatch
+):
+    first, path = make(), tmp_path / "job.pipegui"
+    work_on(first, qtbot, laz)
+    save_to(first, qtbot, monkeypatch, path)
+    window, go = detecting
+    cloud = window.document.scan.cloud
+    window.open_files([path])
+    assert question(window).text() == "Stop “Detecting” and open job.pipegui?"
+    press(window, qtbot, "Cancel")
+    assert window.jobs.title == "Detecting"
+    window.open_files([path])
+    press(window, qtbot, "Stop and open")
+    qtbot.waitUntil(lambda: window.document.result is not None and is_idle(window))
+    assert not go.is_set()
+    assert window.document.scan.cloud is not cloud
+    assert window.windowTitle() == "job[*] – PipeGUI"
+    assert window.panels.message.text.text().startswith("Opened")
 
 
 def test_that_another_scan_is_opened_looked_at_and_closed_while_one_is_detected(
-    make_window, qtbot, laz, tmp_path
+    detecting, qtbot, tmp_path
 ):
-    go, other = threading.Event(), tmp_path / "other.laz"
+    (window, go), other = detecting, tmp_path / "other.laz"
     write_laz(other, make_scan(N + 100)[0])
-
-    def slow(cloud, settings, progress):
-        while not go.wait(0.01):
-            progress.update("ellipses", 0.5)
-        return detect(cloud, settings, progress)
-
-    window = make_window(read=read_file, detect=slow)
-    window.open_files([laz])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled)
-    window.detect()
     window.open_files([other])
     qtbot.waitUntil(lambda: len(window.document.scans) == 2)
     assert window.jobs.is_busy
@@ -425,20 +480,8 @@ def test_that_another_scan_is_opened_looked_at_and_closed_while_one_is_detected(
     assert window.panels.message.text.text().startswith("plant.laz: ")
 
 
-def test_that_a_scan_that_cannot_be_read_beside_a_detection_is_told(
-    make_window, qtbot, laz, tmp_path
-):
-    go = threading.Event()
-
-    def slow(cloud, settings, progress):
-        while not go.wait(0.01):
-            progress.update("ellipses", 0.5)
-        return detect(cloud, settings, progress)
-
-    window = make_window(read=read_file, detect=slow)
-    window.open_files([laz])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled)
-    window.detect()
+def test_that_a_scan_that_cannot_be_read_beside_a_detection_is_told(detecting, qtbot, tmp_path):
+    window, go = detecting
     window.open_files([tmp_path / "none.laz"])
     qtbot.waitUntil(lambda: "none.laz" in window.panels.message.text.text())
     assert window.jobs.is_busy

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
-from pipegui.actions import SPECS
 from pipegui.document import Background, ColourBy, ProfileKey, Selection, Tool
+from pipegui.menus import SPECS
 from pipegui.panels.deformation_columns import INDEX
 from tests.factories import make_cloud, make_result
 
