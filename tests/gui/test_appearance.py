@@ -6,12 +6,7 @@ from PySide6.QtWidgets import QApplication
 
 from pipegui import theme
 
-
-@pytest.fixture(autouse=True)
-def colours_of_the_system(qapp):
-    yield
-    theme.choose(theme.Appearance.SYSTEM)
-    theme.apply_theme(qapp)
+pytestmark = pytest.mark.usefixtures("colours_of_the_system")
 
 
 def luminance(colour):

@@ -13,7 +13,6 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
-from pipegui import theme
 from pipegui.parts import make_parts
 from tests.factories import make_cloud, make_result
 
@@ -26,7 +25,7 @@ MANY = 60_000
 
 
 @pytest.fixture
-def window(make_window, qtbot):
+def window(colours_of_the_system, make_window, qtbot):
     cloud, result = make_cloud(MANY), make_result(MANY)
     window = make_window(
         read=lambda *_: cloud, detect=lambda *_: replace(result), parts=make_parts()
@@ -37,8 +36,7 @@ def window(make_window, qtbot):
     window.detect()
     qtbot.waitUntil(lambda: window.document.result is not None)
     window.panels.message.hide()
-    yield window
-    theme.choose(theme.Appearance.SYSTEM)
+    return window
 
 
 def look(window, name, qtbot):
