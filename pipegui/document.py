@@ -105,6 +105,8 @@ class Box:
 
     low: tuple[float, float, float]
     high: tuple[float, float, float]
+    is_inverted: bool = False
+    """Whether what lies outside is meant, not what lies within."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ class ViewOptions:
     """Elements that stay in the radius plot."""
     fly: bool = True
     clip_box: Box | None = None
-    """Only what lies within is shown."""
+    """Only what lies within is shown, or without if it is inverted."""
     shown_profile: int | None = None
     """The one profile of `shown_stack` that is shown in colour; None: all."""
     point_size: float = 1.0

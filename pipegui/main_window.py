@@ -215,7 +215,9 @@ class MainWindow(QMainWindow):
             self.actions_.set_checked(name, bool(getattr(state.view, name)))
         if state.view.eye_dome is None:
             self.actions_.set_checked("eye_dome", self.parts.scene.shades_edges)
-        self.actions_.set_checked("clip", state.view.clip_box is not None)
+        box = state.view.clip_box
+        self.actions_.set_checked("clip", box is not None)
+        self.actions_.set_checked("invert_clip", box is not None and box.is_inverted)
         self.actions_.set_checked("measure", state.view.tool is Tool.MEASURE)
         self.actions_.set_checked("coordinates", state.view.tool is Tool.COORDINATES)
         for background in Background:

@@ -178,6 +178,15 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "selection",
         ),
         _A(
+            "invert_clip",
+            "Outside of the clip box",
+            "Show what is outside the box instead of what is in it",
+            "",
+            "Ctrl+B",
+            "box",
+            is_checkable=True,
+        ),
+        _A(
             "measure",
             "Measure distance",
             "Measure between two points",

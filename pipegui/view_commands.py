@@ -1,5 +1,6 @@
 """What the user can do to the 3D view, beside the commands on scans and results. Qt-free."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -108,6 +109,23 @@ def switch_clip(document: Document) -> Document:
     return clip_to_scan(document)
 
 
+def invert_clip(document: Document) -> Document:
+    """Show what is outside the clip box instead of what is in it, or the other way round.
+
+    Outside of a box that holds the whole scan there is nothing to see: it is put around
+    what is selected first, or around the middle.
+    """
+    box, scan = document.view.clip_box, document.scan
+    if box is None or scan is None:
+        return document
+    low, high = extent(scan.cloud)
+    if not box.is_inverted and (low >= box.low).all() and (high <= box.high).all():
+        quarter = (high - low) / 4
+        middle = Box(_triple(low + quarter), _triple(high - quarter))
+        box = clip_to_selection(set_clip_box(document, middle)).view.clip_box or middle
+    return set_view(document, clip_box=replace(box, is_inverted=not box.is_inverted))
+
+
 def clip_to_scan(document: Document) -> Document:
     """Let the clip box hold the whole scan."""
     if document.scan is None:
@@ -141,10 +159,11 @@ def clip_to_selection(document: Document) -> Document:
 
 def set_clip_box(document: Document, box: Box) -> Document:
     """Clip to a box; it keeps a centimetre along each axis."""
+    is_inverted = box.is_inverted
     low, high = np.array(box.low), np.array(box.high)
     low, high = np.minimum(low, high), np.maximum(low, high)
     high = np.maximum(high, low + SMALLEST_BOX)
-    return set_view(document, clip_box=Box(_triple(low), _triple(high)))
+    return set_view(document, clip_box=Box(_triple(low), _triple(high), is_inverted))
 
 
 @lru_cache(maxsize=2)

@@ -39,6 +39,7 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "go_up": lambda: do(view_commands.escape),
         "clip": lambda _: do(view_commands.switch_clip),
         "clip_to_selection": lambda: do(view_commands.clip_to_selection),
+        "invert_clip": lambda _: do(view_commands.invert_clip),
         "next_profile": lambda: do(view_commands.step_stack_profile, 1),
         "previous_profile": lambda: do(view_commands.step_stack_profile, -1),
         "measure": lambda _: do(view_commands.choose_tool, Tool.MEASURE),
@@ -127,6 +128,7 @@ def connect_panels(window: "MainWindow") -> None:
     panels.clip.changed.connect(lambda box: do(view_commands.set_clip_box, box))
     panels.clip.whole_requested.connect(lambda: do(view_commands.clip_to_scan))
     panels.clip.selection_requested.connect(lambda: do(view_commands.clip_to_selection))
+    panels.clip.inverted.connect(lambda: do(view_commands.invert_clip))
     panels.clip.closed.connect(lambda: do(commands.set_view, clip_box=None))
     panels.profiles.chosen.connect(lambda i: do(view_commands.show_profile, i))
     panels.profiles.stepped.connect(lambda by: do(view_commands.step_stack_profile, by))

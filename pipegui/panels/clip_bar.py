@@ -1,5 +1,7 @@
 """The clip box in numbers: a bar below the 3D view while there is one."""
 
+from dataclasses import replace
+
 import numpy as np
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
@@ -23,6 +25,7 @@ class ClipBar(QWidget):
     """The `Box` that was typed."""
     whole_requested = Signal()
     selection_requested = Signal()
+    inverted = Signal()
     closed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -51,8 +54,11 @@ class ClipBar(QWidget):
                 row.addWidget(field, 1)
         self.whole = self._button(tr("All"), self.whole_requested)
         self.selection = self._button(tr("Selection"), self.selection_requested)
+        self.invert = self._button(tr("Outside"), self.inverted)
+        self.invert.setCheckable(True)
+        self.invert.setToolTip(tr("Show what is outside the box instead of what is in it"))
         self.close_ = self._button(tr("Off"), self.closed)
-        for button in (self.whole, self.selection, self.close_):
+        for button in (self.whole, self.selection, self.invert, self.close_):
             row.addWidget(button)
         self.hide()
 
@@ -64,6 +70,7 @@ class ClipBar(QWidget):
         if state.box is None or state.cloud is None:
             return
         self._origin = state.cloud.origin
+        self.invert.setChecked(state.box.is_inverted)
         with self._applying:
             for axis, name in enumerate(describe.axis_names(state.cloud)):
                 self._names[axis].setText(name)
@@ -87,4 +94,4 @@ class ClipBar(QWidget):
         ends = [list(self._box.low), list(self._box.high)]
         ends[side][axis] = value - float(self._origin[axis])
         low, high = (tuple(end) for end in ends)
-        self.changed.emit(Box(low, high))
+        self.changed.emit(replace(self._box, low=low, high=high))

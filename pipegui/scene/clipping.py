@@ -1,5 +1,7 @@
 """The clip box in the 3D view: its edges, and the handles by which it is dragged."""
 
+from dataclasses import replace
+
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
@@ -56,7 +58,7 @@ def drag(
     if handle == MIDDLE:
         step = _in_picture(projection, anchor, cursor) - _in_picture(projection, anchor, start)
         low, high = corners(box) + step
-        return Box(_point(low), _point(high))
+        return replace(box, low=_point(low), high=_point(high))
     axis, side = divmod(handle, 2)
     step = _along(projection, anchor, axis, cursor) - _along(projection, anchor, axis, start)
     ends = corners(box)
@@ -65,7 +67,7 @@ def drag(
         ends[1, axis] = max(ends[1, axis], ends[0, axis] + SMALLEST)
     else:
         ends[0, axis] = min(ends[0, axis], ends[1, axis] - SMALLEST)
-    return Box(_point(ends[0]), _point(ends[1]))
+    return replace(box, low=_point(ends[0]), high=_point(ends[1]))
 
 
 def _along(projection: Projection, anchor: Array, axis: int, cursor: tuple[float, float]) -> float:
@@ -114,6 +116,8 @@ class BoxFrame:
         self._layer.AddActor(self._actor)
 
 
-def is_inside(box: Box | None, point: Array) -> bool:
-    """Whether a point is seen: there is no box, or it is in it."""
-    return box is None or bool(((point >= box.low) & (point <= box.high)).all())
+def is_shown(box: Box | None, point: Array) -> bool:
+    """Whether a point is seen: there is no box, or it is on the side that is shown."""
+    if box is None:
+        return True
+    return bool(((point >= box.low) & (point <= box.high)).all()) != box.is_inverted

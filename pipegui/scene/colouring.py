@@ -73,7 +73,7 @@ def colour_points(
 def visible_points(
     cloud: PointCloud, result: Result | None, hidden: frozenset[int], box: Box | None = None
 ) -> NDArray[np.bool_] | None:
-    """Return which points are in the box and not of hidden elements, None if all are."""
+    """Return which points are shown by the box and not of hidden elements, None if all are."""
     seen = None if box is None else points_in(box, cloud.xyz)
     if result is not None and hidden:
         shown = np.ones(len(result.elements) + 1, np.bool_)
@@ -83,7 +83,7 @@ def visible_points(
 
 
 def points_in(box: Box, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
-    """Return which points lie in a box."""
+    """Return which points lie in a box, or outside if it is inverted."""
     inside = np.empty(len(xyz), np.bool_)
     # In the points' own type: as float64 they would take room three times over.
     low, high = np.array(box.low, xyz.dtype), np.array(box.high, xyz.dtype)
@@ -95,7 +95,7 @@ def points_in(box: Box, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
         part &= (y >= low[1]) & (y <= high[1])
         part &= (z >= low[2]) & (z <= high[2])
         inside[at] = part
-    return inside
+    return np.logical_not(inside, out=inside) if box.is_inverted else inside
 
 
 def visible_elements(result: Result | None, hidden: frozenset[int]) -> tuple[Element, ...]:

@@ -204,12 +204,27 @@ class PointLayer:
         return _Slice(stop, rows, xyz, colours, actor)
 
 
+CLIP = "//VTK::Clip::Impl"
+OUTSIDE = """
+  bool isInside = true;
+  for (int planeNum = 0; planeNum < numClipPlanes; planeNum++)
+  {
+    isInside = isInside && clipDistancesVSOutput[planeNum] >= 0.0;
+  }
+  if (isInside) discard;
+"""
+"""In the place of VTK's own, which draws what is on the right side of all planes."""
+
+
 def set_planes(actor: vtkActor, box: Box | None) -> None:
-    """Let an actor draw only what lies in the box."""
-    mapper = actor.GetMapper()
+    """Let an actor draw only what the box shows."""
+    mapper, shader = actor.GetMapper(), actor.GetShaderProperty()
     mapper.RemoveAllClippingPlanes()
+    shader.ClearFragmentShaderReplacement(CLIP, True)
     if box is None:
         return
+    if box.is_inverted:
+        shader.AddFragmentShaderReplacement(CLIP, True, OUTSIDE, False)
     for corner, sign in ((box.low, 1.0), (box.high, -1.0)):
         for axis in range(3):
             plane = vtkPlane()

@@ -130,7 +130,7 @@ class SceneView(QWidget):
                 label_of(d, is_selected=d.deformation_id == state.selection.deformation_id)
                 for d in state.result.deformations
                 if d.element_id not in state.view.hidden_elements
-                and clipping.is_inside(state.view.clip_box, d.peak)
+                and clipping.is_shown(state.view.clip_box, d.peak)
             )
         is_selecting = state.view.tool is Tool.SELECT
         shape = Qt.CursorShape.ArrowCursor if is_selecting else Qt.CursorShape.CrossCursor

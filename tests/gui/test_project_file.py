@@ -120,7 +120,8 @@ plain_views = st.builds(
     st.floats(0.1, 1000),
     st.frozensets(st.integers(1, 99)),
     st.booleans(),
-    clip_box=st.none() | st.builds(Box, st.tuples(*[finite] * 3), st.tuples(*[finite] * 3)),
+    clip_box=st.none()
+    | st.builds(Box, st.tuples(*[finite] * 3), st.tuples(*[finite] * 3), st.booleans()),
 )
 
 

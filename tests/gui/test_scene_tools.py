@@ -204,6 +204,73 @@ def test_that_while_a_face_is_dragged_points_beyond_the_old_box_come_back(desk, 
     assert np.abs(picture(desk.scene) - few).max(axis=2).mean() < 6
 
 
+def test_that_an_inverted_box_shows_what_is_outside_of_it(desk):
+    clip(desk)
+    inside = np.all((CLOUD.xyz >= BOX.low) & (CLOUD.xyz <= BOX.high), axis=1)
+    desk.do(view_commands.invert_clip)
+    settle(desk.qtbot, desk.scene)
+    rows = np.concatenate([s.rows for s in desk.scene.points._slices])
+    assert np.array_equal(np.sort(rows), np.flatnonzero(~inside))
+    desk.do(view_commands.invert_clip)
+    assert desk.view.clip_box == BOX
+
+
+def test_that_an_inverted_box_stays_so_while_it_is_dragged_and_shows_the_same_then(desk, qtbot):
+    clip(desk)
+    desk.do(view_commands.invert_clip)
+    settle(desk.qtbot, desk.scene)
+    start = pixel_of(desk, 1)
+    qtbot.mousePress(desk.scene.canvas, LEFT, pos=start)
+    for i in range(1, 6):
+        event = mouse_move((start + QPoint(-8 * i, 0)).toPointF(), LEFT, NO_KEYS)
+        QApplication.sendEvent(desk.scene.canvas, event)
+    QApplication.processEvents()
+    few = picture(desk.scene)
+    qtbot.mouseRelease(desk.scene.canvas, LEFT, pos=start + QPoint(-40, 0))
+    settle(qtbot, desk.scene)
+    assert desk.view.clip_box.is_inverted
+    assert desk.view.clip_box.high[0] < BOX.high[0] - 0.05
+    assert np.abs(picture(desk.scene) - few).max(axis=2).mean() < 6
+
+
+def test_that_axes_and_labels_follow_an_inverted_box(desk):
+    desk.do(lambda d: view_commands.set_view(d, show_labels=True, show_points=False))
+    settle_without_points(desk)
+    both = picture(desk.scene)
+    peak = RESULT.deformation(1).peak
+    box = Box(tuple((peak - 0.3).tolist()), tuple((peak + 0.3).tolist()))
+    drawn = []
+    for is_inverted in (False, True):
+        desk.do(view_commands.set_clip_box, replace(box, is_inverted=is_inverted))
+        settle_without_points(desk)
+        drawn.append([label.deformation_id for label in desk.scene.overlay.labels])
+        hidden = np.abs(picture(desk.scene) - both).max(axis=2) > 60
+        assert hidden.any()
+    assert sorted(drawn[0] + drawn[1]) == [1, 2, 3, 4]
+    assert drawn[0] == [1]
+
+
+def settle_without_points(desk):
+    desk.qtbot.waitUntil(lambda: not desk.scene.canvas.is_moving)
+    with desk.qtbot.waitSignal(desk.scene.canvas.drawn):
+        desk.scene.canvas.draw()
+
+
+def test_that_a_box_around_everything_is_made_smaller_to_be_inverted():
+    document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),), view=STILL)
+    assert view_commands.invert_clip(document) is document
+    whole = view_commands.clip_to_scan(document)
+    box = view_commands.invert_clip(whole).view.clip_box
+    inside = np.all((CLOUD.xyz >= box.low) & (CLOUD.xyz <= box.high), axis=1)
+    assert box.is_inverted
+    assert not inside.all()
+    # What is selected is what is in the way.
+    index = int(np.flatnonzero(RESULT.element_id == 7)[0])
+    chosen = view_commands.select_point(whole, index)
+    around = view_commands.clip_to_selection(chosen).view.clip_box
+    assert view_commands.invert_clip(chosen).view.clip_box == replace(around, is_inverted=True)
+
+
 def test_that_overlays_are_clipped_with_the_points(desk):
     desk.do(lambda d: view_commands.set_view(d, show_labels=True))
     assert len(desk.scene.overlay.labels) == 4

@@ -48,6 +48,26 @@ def test_that_the_bar_clips_to_the_selection_and_back_and_off(detected, qtbot):
     assert not bar.isVisible()
 
 
+def test_that_the_bar_and_the_menu_show_what_is_outside_of_the_box(detected, qtbot):
+    bar = detected.panels.clip
+    assert not detected.actions_["invert_clip"].isEnabled()
+    qtbot.keyClick(detected, Qt.Key.Key_B)
+    qtbot.mouseClick(bar.selection, LEFT)
+    qtbot.mouseClick(bar.invert, LEFT)
+    assert detected.parts.scene.state.view.clip_box.is_inverted
+    assert detected.actions_["invert_clip"].isChecked()
+    # Typing a number keeps the side.
+    field = bar.ends[0][0]
+    field.setFocus()
+    field.selectAll()
+    qtbot.keyClicks(field, f"{field.value() - 0.5:.2f}")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert detected.document.view.clip_box.is_inverted
+    qtbot.keyClick(detected, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
+    assert not detected.document.view.clip_box.is_inverted
+    assert not bar.invert.isChecked()
+
+
 @pytest.fixture
 def sliced(detected):
     """The profiles of stack 1 are shown."""
