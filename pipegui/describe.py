@@ -16,6 +16,7 @@ from pipecore.report.format import (
     format_coordinate,
 )
 from pipecore.rules import outside_diameter
+from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipecore.types import (
     NO_ID,
     Deformation,
@@ -29,7 +30,7 @@ from pipecore.types import (
 )
 from pipegui.cuts import stack_name
 from pipegui.document import Scan, Selection
-from pipegui.texts import count, first_capital, format_measure, label_of, mark, tr
+from pipegui.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.view_state import PropertiesState
 
 OVALITY = "(Dmax − Dmin) / Dnom"
@@ -152,7 +153,7 @@ def title(result: Result | None, selection: Selection) -> str:
     if result is None or selection == Selection():
         return ""
     if not selection.element_id:
-        return tr("Run {run_id}").format(run_id=selection.run_id)
+        return run_label(result, selection.run_id)
     parts = [label_of(result.element(selection.element_id))]
     if selection.deformation_id:
         deformation = result.deformation(selection.deformation_id)
@@ -227,7 +228,7 @@ def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
 def _of_run(result: Result, run_id: int) -> Iterator[Property | Heading]:
     elements = [e for e in result.elements if e.run_id == run_id]
     ids = {e.element_id for e in elements}
-    yield Heading(tr("Run {run_id}").format(run_id=run_id))
+    yield Heading(run_label(result, run_id))
     yield Property(tr("Elements"), str(len(elements)), str(len(elements)))
     yield _measure(tr("Length"), sum(e.axis.length for e in elements), unit="m")
     sizes = sorted({e.nominal.name for e in elements if e.nominal})
@@ -272,6 +273,29 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
     if element.gaps:
         gaps = ", ".join(f"{a:.2f} – {b:.2f} m ({b - a:.2f} m)" for a, b in element.gaps)
         yield Property(tr("Gaps"), gaps, hint=tr("Chainages without profiles, and their lengths."))
+    if element.element_id in result.own_settings:
+        yield _of_settings(result.own_settings[element.element_id], result.settings)
+
+
+def _of_settings(own: Settings, others: Settings) -> Property:
+    """What is different in the settings with which an element was detected again."""
+    lines = [
+        f"{tr(spec.label)}: {_setting(own, key, spec)} ({_setting(others, key, spec)})"
+        for key, spec in iterate_fields()
+        if own.get(key) != others.get(key)
+    ]
+    hint = tr("Detected again with these (in brackets: the other elements’):")
+    return Property(tr("Own settings"), "; ".join(lines), hint="\n".join((hint, *lines)))
+
+
+def _setting(settings: Settings, key: str, spec: FieldSpec) -> str:
+    value = settings.get(key)
+    if value == 0 and spec.zero_means:
+        return tr(spec.zero_means)
+    if isinstance(value, tuple):
+        return str(len(value))
+    text = f"{value:g}" if isinstance(value, float) else tr(str(value))
+    return f"{text} {spec.unit}".strip()
 
 
 def _of_deformation(

@@ -10,7 +10,7 @@ from pipecore.types import NO_ID, NominalSize, PointCloud, Result
 from pipegui import selecting
 from pipegui.commands import step
 from pipegui.document import Document, Scan
-from pipegui.texts import label_of, mark, tr
+from pipegui.texts import label_of, mark, run_label, tr
 
 
 def _names(document: Document, element_ids: Iterable[int]) -> str:
@@ -44,6 +44,20 @@ def rename_element(document: Document, element_id: int, name: str) -> Document:
     if document.result is None or label_of(document.result.element(element_id)) == name.strip():
         return document
     return _with_result(document, document.active, name_element(document.result, element_id, name))
+
+
+@step(
+    lambda document, run_id, name: tr("Rename {names}").format(
+        names=run_label(document.result, run_id) if document.result else ""
+    )
+)
+def rename_run(document: Document, run_id: int, name: str) -> Document:
+    """Call a run by a name; "" goes back to its number."""
+    from pipecore.editing import name_run  # noqa: PLC0415 - loads numba
+
+    if document.result is None or run_label(document.result, run_id) == name.strip():
+        return document
+    return _with_result(document, document.active, name_run(document.result, run_id, name))
 
 
 @step(

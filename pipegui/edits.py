@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "")
 CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
     NodeKind.SCAN: ("fit", "show_all", "", "detect", "detect_in_box", "", "rename", "close_scan"),
-    NodeKind.RUN: (*_OF_ELEMENTS, "detect_around", "delete"),
+    NodeKind.RUN: (*_OF_ELEMENTS, "rename", "detect_around", "delete"),
     NodeKind.ELEMENT: (
         *_OF_ELEMENTS,
         "rename",
@@ -88,11 +88,14 @@ class Edits:
         self._window.panels.tree.rename()
 
     def take_name(self, scan_index: int, kind: NodeKind, item_id: int, name: str) -> None:
-        """Name a scan or an element of the active one."""
-        if kind is NodeKind.SCAN:
-            self._window.do(edit_commands.rename_scan, scan_index, name)
-        else:
-            self._window.do(edit_commands.rename_element, item_id, name)
+        """Name a scan, or a run or an element of the active one."""
+        match kind:
+            case NodeKind.SCAN:
+                self._window.do(edit_commands.rename_scan, scan_index, name)
+            case NodeKind.RUN:
+                self._window.do(edit_commands.rename_run, item_id, name)
+            case NodeKind.ELEMENT:
+                self._window.do(edit_commands.rename_element, item_id, name)
 
     def hide(self) -> None:
         """Hide the selected elements."""

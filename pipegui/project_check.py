@@ -24,6 +24,7 @@ def check_result(result: Result) -> None:
     for deformation in result.deformations:
         _check_vectors(deformation.peak)
     own = {d.element_id for d in result.deformations} | set(result.profiles.element_id.tolist())
+    own |= set(result.own_settings)
     of_points = {int(result.element_id.min(initial=NO_ID)), int(result.element_id.max(initial=0))}
     if not own <= set(ids) or not of_points <= {NO_ID, *ids}:
         raise ValueError("something belongs to an element that is not there")

@@ -39,7 +39,20 @@ FORMAT_VERSION = 1
 CONTENTS = "project.json"
 POINT_ARRAYS = {"segment_id": np.int32, "element_id": np.int32, "deviation": np.float32}
 IN_PROFILES = {f.name for f in fields(Profiles)}
-IN_JSON = ("source", "n_cloud_points", "stacks", "elements", "deformations", "seconds", "edits")
+IN_JSON: dict[str, Any] = {
+    "source": Path | None,
+    "n_cloud_points": int,
+    "stacks": tuple[Stack, ...],
+    "elements": tuple[Element, ...],
+    "deformations": tuple[Deformation, ...],
+    "seconds": dict[str, float],
+    "edits": tuple[str, ...],
+    "run_names": dict[int, str],
+    "own_settings": dict[int, Settings],
+    "settings": Settings,
+    "origin": NDArray[np.float64],
+}
+"""What of a result is kept as JSON, with its kinds."""
 
 Camera = Mapping[str, list[float]]
 
@@ -185,10 +198,7 @@ def _scan_to_plain(scan: Scan, folder: Path) -> dict[str, Any]:
         "result": None,
     }
     if result is not None:
-        plain["result"] = {name: to_plain(getattr(result, name)) for name in IN_JSON} | {
-            "settings": to_plain(result.settings),
-            "origin": to_plain(result.origin),
-        }
+        plain["result"] = {name: to_plain(getattr(result, name)) for name in IN_JSON}
     return plain
 
 
@@ -301,18 +311,9 @@ def _result(
     archive: zipfile.ZipFile,
     progress: Progress,
 ) -> Result:
-    kinds = {
-        "source": Path | None,
-        "n_cloud_points": int,
-        "stacks": tuple[Stack, ...],
-        "elements": tuple[Element, ...],
-        "deformations": tuple[Deformation, ...],
-        "seconds": dict[str, float],
-        "edits": tuple[str, ...],
-        "settings": Settings,
-        "origin": NDArray[np.float64],
+    values = {
+        name: from_plain(kind, plain[name]) for name, kind in IN_JSON.items() if name in plain
     }
-    values = {name: from_plain(kind, plain[name]) for name, kind in kinds.items() if name in plain}
     n_points = values.get("n_cloud_points")
     if n_points != reference.n_points:
         raise ValueError("the result is of another cloud")

@@ -79,8 +79,10 @@ def carried_over(selection: Selection, old: Result | None, new: Result | None) -
     """Return the same selection in another result of the same cloud, as far as it is there."""
     if old is new:
         return selection
-    if old is None or new is None or not selection.element_id:
+    if old is None or new is None:
         return Selection()
+    if not selection.element_id:
+        return Selection(run_id=_same_run(selection.run_id, old, new))
     element = old.element(selection.element_id)
     twin = _same_element(element, new)
     if twin is None:
@@ -98,6 +100,14 @@ def carried_over(selection: Selection, old: Result | None, new: Result | None) -
             profile = nearest_profile(new, twin.element_id, float(chainage[0]))
             kept = Selection(kept.run_id, kept.element_id, kept.deformation_id, profile)
     return kept
+
+
+def _same_run(run_id: int, old: Result, new: Result) -> int:
+    """Id of the run that the longest element of a run is in that is found again."""
+    elements = (e for e in old.elements if e.run_id == run_id != NO_ID)
+    longest_first = sorted(elements, key=lambda e: -e.axis.length)
+    twins = (_same_element(e, new) for e in longest_first)
+    return next((twin.run_id for twin in twins if twin is not None), NO_ID)
 
 
 def reviews_carried_over(

@@ -11,7 +11,7 @@ from typing import Any
 from pipecore.report.format import NOT_MEASURABLE
 from pipecore.report.format import format_measure as _format_measure
 from pipecore.resources import resource
-from pipecore.types import Element
+from pipecore.types import Element, Result
 
 LANGUAGES = {"": "As the system", "en": "English", "de": "Deutsch"}
 """Names of the languages by their codes, each in its own; "" is the system's."""
@@ -80,6 +80,11 @@ def label_of(element: Element) -> str:
     """What an element is called: its own name, else such as "Pipe 3"."""
     kind = element.label.removesuffix(f" {element.element_id}")
     return element.name or f"{tr(kind)} {element.element_id}"
+
+
+def run_label(result: Result, run_id: int) -> str:
+    """What a run is called: its own name, else such as "Run 3"."""
+    return result.run_names.get(run_id) or tr("Run {run_id}").format(run_id=run_id)
 
 
 def format_measure(*args: Any, **options: Any) -> str:

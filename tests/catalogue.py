@@ -13,6 +13,7 @@ from babel.messages.extract import extract_from_dir
 from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
+from pipecore.editing import STAGES as EDITING_STAGES
 from pipecore.io import file_filter
 from pipecore.pipeline import STAGES
 from pipecore.report.format import NOT_MEASURABLE
@@ -57,7 +58,7 @@ def tables() -> Iterator[str]:
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():
         yield from (preset.name, preset.description)
-    yield from (*STAGES, *MORE_STAGES, NOT_MEASURABLE)
+    yield from (*STAGES, *EDITING_STAGES, *MORE_STAGES, NOT_MEASURABLE)
     for kind in file_filter().split(";;"):
         name = kind.partition(" (")[0]
         if name in ("Point clouds", "All files"):

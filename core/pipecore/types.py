@@ -445,6 +445,10 @@ class Result:
         Time spent per step.
     edits : tuple of str
         What was changed by hand since the detection, the first change first.
+    run_names : mapping of int to str
+        What a person calls runs, by their ids; the others go by number.
+    own_settings : mapping of int to Settings
+        Of elements that were detected again with other settings, by their ids.
     """
 
     settings: Settings
@@ -460,6 +464,16 @@ class Result:
     deviation: NDArray[np.float32]
     seconds: dict[str, float]
     edits: tuple[str, ...] = ()
+    run_names: Mapping[int, str] = field(default_factory=dict)
+    own_settings: Mapping[int, Settings] = field(default_factory=dict)
+
+    def settings_of(self, element_id: int) -> Settings:
+        """Return the settings with which an element was found."""
+        return self.own_settings.get(element_id, self.settings)
+
+    def run_label(self, run_id: int) -> str:
+        """What people call a run: its own name, else such as "Run 3"."""
+        return self.run_names.get(run_id) or f"Run {run_id}"
 
     def element(self, element_id: int) -> Element:
         """Return the element with this id; `KeyError` if there is none."""

@@ -20,7 +20,7 @@ from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Deformation, Element, Result
 from pipegui import describe, theme
 from pipegui.document import Scan, Selection
-from pipegui.texts import count, first_capital, format_measure, label_of, mark, tr
+from pipegui.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.view_state import TreeState
 
 Index = QModelIndex | QPersistentModelIndex
@@ -47,6 +47,8 @@ class _Node:
     scan_index: int = 0
     item_id: int = NO_ID
     text: str = ""
+    name: str = ""
+    """What the user edits, where that is not the whole text."""
     icon: str = ""
     tint: str = ""
     radius: str = ""
@@ -109,7 +111,8 @@ class ProjectModel(QAbstractItemModel):
     def _add_scan(self, index: int, scan: Scan) -> None:
         result = scan.result
         hint = str(scan.cloud.source or scan.name)
-        node = _Node(NodeKind.SCAN, self._root, index, NO_ID, scan.name, "scatter-plot-outline")
+        node = _Node(NodeKind.SCAN, self._root, index, NO_ID, scan.name)
+        node.icon = "scatter-plot-outline"
         node.hint = f"{hint}\n{describe.point_count(len(scan.cloud))}"
         self._add(node)
         if result is None:
@@ -117,7 +120,7 @@ class ProjectModel(QAbstractItemModel):
         node.elements = tuple(e.element_id for e in result.elements)
         ranked = by_verdict(result)
         for run_id in sorted({e.run_id for e in result.elements}):
-            self._add_run(node, run_id, [e for e in result.elements if e.run_id == run_id], ranked)
+            self._add_run(node, run_id, result, ranked)
         if ranked:
             branch = _Node(NodeKind.DEFORMATIONS, node, index)
             branch.text, branch.icon = tr("Deformations ({n})").format(n=len(ranked)), "target"
@@ -126,11 +129,13 @@ class ProjectModel(QAbstractItemModel):
                 self._add_deformation(branch, deformation, result)
 
     def _add_run(
-        self, parent: _Node, run_id: int, elements: list[Element], ranked: list[Deformation]
+        self, parent: _Node, run_id: int, result: Result, ranked: list[Deformation]
     ) -> None:
+        elements = [e for e in result.elements if e.run_id == run_id]
         if len(elements) > 1:
-            text = tr("Run {run_id} ({n})").format(run_id=run_id, n=len(elements))
-            run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, text)
+            name = run_label(result, run_id)
+            text = f"{name} ({len(elements)})"
+            run = _Node(NodeKind.RUN, parent, parent.scan_index, run_id, text, name)
             run.icon, run.elements = "pipe-disconnected", tuple(e.element_id for e in elements)
             run.hint = count("{n:,} element", "{n:,} elements", len(elements))
             parent = self._add(run)
@@ -202,7 +207,9 @@ class ProjectModel(QAbstractItemModel):
         is_active = node.scan_index == self._state.active
         if index.column() == NAME and node.elements and is_active:
             flags |= Qt.ItemFlag.ItemIsUserCheckable
-        is_named = node.kind is NodeKind.SCAN or (node.kind is NodeKind.ELEMENT and is_active)
+        is_named = node.kind is NodeKind.SCAN or (
+            node.kind in (NodeKind.RUN, NodeKind.ELEMENT) and is_active
+        )
         if index.column() == NAME and is_named:
             flags |= Qt.ItemFlag.ItemIsEditable
         return flags
@@ -215,7 +222,7 @@ class ProjectModel(QAbstractItemModel):
         value: Any = None
         match role:
             case Role.EditRole if index.column() == NAME:
-                value = node.text
+                value = node.name or node.text
             case Role.DisplayRole:
                 badge = str(len(node.badge)) if node.kind is NodeKind.ELEMENT and node.badge else ""
                 value = (node.text, node.radius, badge)[index.column()]

@@ -90,6 +90,7 @@ def test_that_what_changes_nothing_is_no_step():
     history.do(edit_commands.delete_elements, [])
     history.do(edit_commands.rename_element, 2, "Pipe 2")
     history.do(edit_commands.rename_scan, 0, "  ")
+    history.do(edit_commands.rename_run, 1, " Run 1")
     history.do(edit_commands.set_nominal_size, 2, RESULT.element(2).nominal)
     assert history.steps == []
 

@@ -114,6 +114,29 @@ def test_that_f2_names_a_pipe_in_the_tree_and_the_name_shows_everywhere(window, 
     assert window.document.result.element(2).label == "Pipe 2"
 
 
+def test_that_f2_names_a_run_and_the_name_shows_everywhere(window, qtbot):
+    view, model = window.panels.tree.view, window.panels.tree.model
+    row = model.index_of(0, Selection(run_id=1))
+    n_elements = len(window.panels.tree.model._node(row).elements)
+    view.scrollTo(row)
+    qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(row).center())
+    qtbot.keyClick(view, Qt.Key.Key_F2)
+    editor = view.findChild(QLineEdit)
+    assert editor.text() == "Run 1"
+    qtbot.keyClicks(editor, "Cooling water")
+    qtbot.keyClick(editor, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: window.document.result.run_names == {1: "Cooling water"})
+    assert window.document.selection == Selection(run_id=1)
+    assert model.index_of(0, Selection(run_id=1)).data() == f"Cooling water ({n_elements})"
+    assert window.panels.docks["Element"].windowTitle() == "Cooling water"
+    assert window.panels.properties.list.topLevelItem(0).text(0) == "Cooling water"
+    assert window.history.undo_text == "Rename Run 1"
+    window.history.undo()
+    assert model.index_of(0, Selection(run_id=1)).data() == f"Run 1 ({n_elements})"
+    window.history.redo()
+    assert window.document.result.run_names == {1: "Cooling water"}
+
+
 def test_that_a_scan_is_renamed_without_moving_the_view(window, qtbot):
     view, model = window.panels.tree.view, window.panels.tree.model
     row = model.index(0, NAME)

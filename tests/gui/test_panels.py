@@ -1,5 +1,7 @@
 """Panels and models, each on its own, with real clicks and keys."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QModelIndex, Qt
@@ -261,6 +263,20 @@ def test_that_properties_carry_unit_and_uncertainty(qtbot, document):
     ovality = panel.list.findItems("Ovality", Qt.MatchFlag.MatchExactly, 0)[0]
     assert ovality.text(1) == "not measurable"
     assert "140° of arc" in ovality.toolTip(1)
+
+
+def test_that_properties_tell_with_what_an_element_was_detected_again(qtbot, document):
+    [scan] = document.scans
+    own = scan.result.settings.replace({"elements.min_radius_mm": 12.0})
+    result = replace(scan.result, own_settings={2: own})
+    document = replace(document, scans=(replace(scan, result=result),))
+    panel = show(qtbot, PropertiesPanel())
+    panel.apply(resolve(commands.select_element(document, 2)).properties)
+    [line] = panel.list.findItems("Own settings", Qt.MatchFlag.MatchExactly, 0)
+    before = f"{scan.result.settings.elements.min_radius_mm:g} mm"
+    assert line.text(1) == f"Smallest radius: 12 mm ({before})"
+    panel.apply(resolve(commands.select_element(document, 7)).properties)
+    assert not panel.list.findItems("Own settings", Qt.MatchFlag.MatchExactly, 0)
 
 
 # Settings

@@ -38,7 +38,13 @@ def stored(tmp_path_factory):
     return Scan(
         "plant.laz",
         read_back,
-        replace(result, source=path, origin=read_back.origin),
+        replace(
+            result,
+            source=path,
+            origin=read_back.origin,
+            run_names={1: "Feed line"},
+            own_settings={2: Settings().replace({"deformation.min_depth_mm": 7.5})},
+        ),
         {1: Review(ReviewState.REJECTED, "seen “on site”\nby A.")},
     )
 

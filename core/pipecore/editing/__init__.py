@@ -9,7 +9,13 @@ in a detection; the others keep their ids, names and measures.
 """
 
 from pipecore.editing.again import detect_again, points_around, points_in_box
-from pipecore.editing.changes import delete_elements, kinds_of, name_element, set_nominal_size
+from pipecore.editing.changes import (
+    delete_elements,
+    kinds_of,
+    name_element,
+    name_run,
+    set_nominal_size,
+)
 from pipecore.editing.reshaping import STAGES, change_kind, merge_elements, split_element
 
 __all__ = [
@@ -20,6 +26,7 @@ __all__ = [
     "kinds_of",
     "merge_elements",
     "name_element",
+    "name_run",
     "points_around",
     "points_in_box",
     "set_nominal_size",

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.editing.changes import find, noted, without
+from pipecore.editing.changes import find, noted, with_settings, without
 from pipecore.editing.measuring import in_box, part_of, points_near
 from pipecore.errors import EditError
 from pipecore.pipeline import detect
@@ -85,8 +85,10 @@ def detect_again(
     taken = [e for e in found.elements if n_kept[e.element_id] <= TAKEN * n_found[e.element_id]]
     new_id = _ids(taken, found, before, gone, n_ids)
     stacks, stack_ids = _joined_stacks(result.stacks, found.stacks)
+    elements = _numbered(taken, new_id, result)
+    joined = _joined(rest, result, found, index, elements, stacks, stack_ids)
     return noted(
-        _joined(rest, result, found, index, _numbered(taken, new_id, result), stacks, stack_ids),
+        with_settings(joined, {e.element_id for e in elements.values()}, settings),
         f"detected again among {len(index)} points: {len(taken)} elements",
     )
 

@@ -11,6 +11,7 @@ from pipecore.deformation import relate_deformations
 from pipecore.errors import EditError
 from pipecore.geometry import LineAxis
 from pipecore.rules import judge, load_rule
+from pipecore.settings import Settings
 from pipecore.types import NO_ID, Element, ElementKind, NominalSize, Result
 
 NOT_RELATED: dict[str, Any] = {
@@ -43,6 +44,22 @@ def name_element(result: Result, element_id: int, name: str) -> Result:
     return noted(renamed, f"named {replace(element, name='').label} “{name}”" if name else "")
 
 
+def name_run(result: Result, run_id: int, name: str) -> Result:
+    """Call a run by a name; "" goes back to its number.
+
+    Raises
+    ------
+    EditError
+        If there is no such run.
+    """
+    if run_id not in {e.run_id for e in result.elements}:
+        raise EditError(f"There is no run {run_id}.")
+    name = " ".join(name.split())
+    others = {i: other for i, other in result.run_names.items() if i != run_id}
+    names = others | ({run_id: name} if name else {})
+    return noted(replace(result, run_names=names), f"named run {run_id} “{name}”" if name else "")
+
+
 def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) -> Result:
     """Say which catalogue size an element has; its deformations are judged anew.
 
@@ -53,7 +70,7 @@ def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) 
     """
     element = find(result, element_id)
     sized = replace(element, nominal=size)
-    rule = load_rule(result.settings.deformation.rule)
+    rule = load_rule(result.settings_of(element_id).deformation.rule)
     deformations = tuple(
         replace(d, verdict=judge(d, sized, rule)) if d.element_id == element_id else d
         for d in result.deformations
@@ -97,8 +114,10 @@ def listed(elements: Iterable[Element]) -> str:
 def noted(result: Result, what: str) -> Result:
     """Take note of a change; relate the deformations to what is around them now."""
     alone = [replace(d, **NOT_RELATED) for d in result.deformations]
+    runs = {e.run_id for e in result.elements}
     return replace(
         result,
+        run_names={i: name for i, name in result.run_names.items() if i in runs},
         deformations=relate_deformations(alone, result.elements),
         edits=(*result.edits, what) if what else result.edits,
     )
@@ -108,6 +127,14 @@ def with_element(result: Result, element: Element) -> Result:
     """Put an element in the place of the one with its id."""
     elements = (element if e.element_id == element.element_id else e for e in result.elements)
     return replace(result, elements=tuple(elements))
+
+
+def with_settings(result: Result, element_ids: Collection[int], settings: Settings) -> Result:
+    """Take note of the settings with which some elements were found or measured."""
+    own = {i: other for i, other in result.own_settings.items() if i not in element_ids}
+    if settings != result.settings:
+        own |= dict.fromkeys(sorted(element_ids), settings)
+    return replace(result, own_settings=own)
 
 
 def without(result: Result, element_ids: Collection[int]) -> Result:
@@ -120,6 +147,7 @@ def without(result: Result, element_ids: Collection[int]) -> Result:
         profiles=result.profiles[~np.isin(result.profiles.element_id, list(element_ids))],
         element_id=np.where(of_gone, np.int32(NO_ID), result.element_id),
         deviation=np.where(of_gone, np.float32(np.nan), result.deviation),
+        own_settings={i: s for i, s in result.own_settings.items() if i not in element_ids},
     )
 
 

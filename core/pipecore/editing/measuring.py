@@ -6,16 +6,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.editing.changes import without
+from pipecore.editing.changes import with_settings, without
 from pipecore.elements import BuiltElements, NearbyPoints
 from pipecore.elements.extent import MAX_SECTORS, section_misfit
-from pipecore.elements.refine import MAX_FIT_POINTS, axis_through
-from pipecore.elements.surfaces import ArcSurface, LineSurface, fit_surface
+from pipecore.elements.refine import axis_through, fit_measured
+from pipecore.elements.surfaces import ArcSurface, LineSurface
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, Array
 from pipecore.measurement import measure_elements
-from pipecore.progress import Progress
+from pipecore.progress import Progress, Renamed
 from pipecore.rules import judge, load_rule
+from pipecore.settings import ThinningSettings
 from pipecore.surface import sample_surface
 from pipecore.types import (
     NO_ID,
@@ -43,26 +44,38 @@ class Shape:
     is_fitted: bool
 
 
-def fit_shape(element: Element, xyz: Array) -> Shape:
-    """Fit an element's surface to points between its ends, by robust least squares.
+def fit_shape(
+    element: Element, part: PointCloud, thinning: ThinningSettings, progress: Progress
+) -> Shape:
+    """Fit an element's surface to its points between its ends, as a detection does.
 
     Parameters
     ----------
     element : Element
         Where to start; its axis is kept in length, up to the fit's own change.
-    xyz : ndarray, shape (n, 3)
+    part : PointCloud
         Points of its surface, and perhaps some beyond its ends.
+    thinning : ThinningSettings
+    progress : Progress
+        Told of the stage "fitting".
+
+    Raises
+    ------
+    CancelledError
+        From `progress`.
     """
-    chainage, _, _ = element.axis.pipe_coordinates(xyz)
-    xyz = xyz[(chainage >= 0) & (chainage <= element.axis.length)]
-    if len(xyz) > MAX_FIT_POINTS:
-        # In an order of their own, so that the cloud's order does not matter.
-        rows = np.linspace(0, len(xyz) - 1, MAX_FIT_POINTS).astype(np.intp)
-        xyz = xyz[np.lexsort(xyz.T)][rows]
-    model = _model_of(element)
-    fit = fit_surface(model, xyz, 3.0 * max(element.rms, 0.001)) if len(xyz) else None
-    if fit is None or abs(fit.model.radius - model.radius) > 0.25 * model.radius:
+    chainage, _, _ = element.axis.pipe_coordinates(part.xyz.astype(np.float64))
+    between = np.flatnonzero((chainage >= 0) & (chainage <= element.axis.length))
+    if len(between) == 0:
         return Shape(element, is_fitted=False)
+    part = part_of(part, between)
+    surface = sample_surface(part, thinning, Renamed(progress, "fitting"))
+    nearby, thinned = NearbyPoints(part, surface), np.arange(len(surface.xyz))
+    model, scale = _model_of(element), 3.0 * max(element.rms, 0.001)
+    fit = fit_measured(model, thinned, nearby, scale, nearby.usual_spacing(thinned))
+    if fit is None:
+        return Shape(element, is_fitted=False)
+    xyz = part.xyz.astype(np.float64)
     axis = axis_through(fit.model, np.stack([element.axis.start, element.axis.end]))
     residual, _, _ = fit.model.residuals(xyz)
     _, _, clock = axis.pipe_coordinates(xyz)
@@ -116,22 +129,24 @@ def measure_anew(
     gone : collection of int
         Ids of the elements that they replace.
     elements : sequence of Element
-        With their ids, axes and radii.
+        With their ids, axes and radii. They are measured with the settings of the first
+        one that they replace.
     progress : Progress
     """
-    rule = load_rule(result.settings.deformation.rule)
+    settings = result.settings_of(elements[0].element_id)
+    rule = load_rule(settings.deformation.rule)
     rest = without(result, gone)
     index = points_near(cloud, elements)
     part = part_of(cloud, index)
-    surface = sample_surface(part, result.settings.thinning, progress)
+    surface = sample_surface(part, settings.thinning, progress)
     built = BuiltElements(tuple(elements), tuple(np.empty(0, np.intp) for _ in elements))
     measured = measure_elements(
         built,
         NearbyPoints(part, surface),
         len(part),
         result.stacks[0].width,
-        result.settings.deformation,
-        result.settings.ellipses.fit,
+        settings.deformation,
+        settings.ellipses.fit,
         progress,
         others=rest.elements,
     )
@@ -145,13 +160,14 @@ def measure_anew(
         np.isin(result.profiles.element_id, list(gone)) & (result.profiles.stack_id != OWN_STACK)
     ]
     tables = [measured.profiles, *(_of_stacks_on(e, of_stacks) for e in measured.elements)]
-    return _inserted(
+    changed = _inserted(
         rest,
         measured.elements,
         Profiles.concatenate(tables),
         deformations,
         (index, measured.element_id, measured.deviation),
     )
+    return with_settings(changed, own, settings)
 
 
 def _inserted(

@@ -13,9 +13,10 @@ from pipecore.elements.extent import SHOWN_GAP
 from pipecore.errors import EditError
 from pipecore.geometry import ArcAxis, Array, LineAxis
 from pipecore.progress import NoProgress, Progress
+from pipecore.settings import ElementSettings
 from pipecore.types import Element, ElementKind, PointCloud, Result
 
-STAGES = {"thinning": 0.2, "normals": 0.3, "deformations": 0.5}
+STAGES = {"fitting": 0.2, "thinning": 0.15, "normals": 0.25, "deformations": 0.4}
 """The stages in their order, with the share of the time that each usually takes."""
 
 MERGED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
@@ -67,14 +68,18 @@ def merge_elements(
         gaps=tuple(sorted((*between, *_gaps_on(axis, parts)))),
     )
     gone = {p.element_id for p in parts}
-    shape = _shape_on(cloud, result, merged, gone)
-    merged = _sized(shape.element, result)
+    shape = _shape_on(cloud, result, merged, gone, progress)
+    merged = _sized(shape.element, result.settings_of(first.element_id).elements)
     changed = measure_anew(cloud, result, gone, [merged], progress)
     runs = {p.run_id for p in parts}
     elements = (
         replace(e, run_id=first.run_id) if e.run_id in runs else e for e in changed.elements
     )
-    return noted(replace(changed, elements=tuple(elements)), f"merged {listed(parts)}")
+    names = [result.run_names.get(p.run_id, "") for p in parts]
+    name = next(filter(None, names), "")
+    run_names = {**result.run_names, first.run_id: name} if name else result.run_names
+    joined = replace(changed, elements=tuple(elements), run_names=run_names)
+    return noted(joined, f"merged {listed(parts)}")
 
 
 def split_element(
@@ -121,8 +126,8 @@ def split_element(
             for low, high in whole.gaps
         )
         piece_ = replace(piece, gaps=tuple((a, b) for a, b in gaps if b > a))
-        shape = _shape_on(cloud, result, piece_, {element_id}, must_fit=False)
-        parts.append(_sized(shape.element, result))
+        shape = _shape_on(cloud, result, piece_, {element_id}, progress, must_fit=False)
+        parts.append(_sized(shape.element, result.settings_of(element_id).elements))
     changed = measure_anew(cloud, result, {element_id}, parts, progress)
     return noted(changed, f"split {whole.label} at {chainage:.3f} m")
 
@@ -151,8 +156,8 @@ def change_kind(
         if kind is not ElementKind.CONE:
             mean = 0.5 * (element.radius + element.radius_end)
             changed = replace(changed, radius=mean, radius_end=mean)
-        changed = _shape_on(cloud, result, changed, {element_id}).element
-    changed = _sized(changed, result)
+        changed = _shape_on(cloud, result, changed, {element_id}, progress).element
+    changed = _sized(changed, result.settings_of(element_id).elements)
     anew = measure_anew(cloud, result, {element_id}, [changed], progress)
     return noted(anew, f"{element.label} is a {kind}")
 
@@ -162,21 +167,21 @@ def _shape_on(
     result: Result,
     element: Element,
     owners: Collection[int],
+    progress: Progress,
     *,
     must_fit: bool = True,
 ) -> Shape:
     """Fit an element to the points of its former owners between its ends."""
     index = np.flatnonzero(on_elements(result.element_id, owners))
-    xyz = part_of(cloud, index).xyz.astype(np.float64)
-    shape = fit_shape(element, xyz)
+    thinning = result.settings_of(min(owners)).thinning
+    shape = fit_shape(element, part_of(cloud, index), thinning, progress)
     if not shape.is_fitted and must_fit:
         raise EditError(f"The points do not carry {element.label} as a {element.kind}.")
     return shape
 
 
-def _sized(element: Element, result: Result) -> Element:
+def _sized(element: Element, settings: ElementSettings) -> Element:
     """The element with its catalogue size looked up, as a detection does."""
-    settings = result.settings.elements
     if element.kind not in (ElementKind.CYLINDER, ElementKind.TORUS):
         return replace(element, nominal=None)
     size = nominal_size(2 * element.radius, settings.catalogue, settings.size_tolerance_pct)

@@ -150,9 +150,10 @@ def refine_piece(
         clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
         core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
         chosen = near.own[core if core.sum() > 30 else within]
-        fit = _fit_to(model, chosen, nearby, 3.0 * sigma, is_final)
-        if is_final and fit is not None and isinstance(fit.model, LineSurface):
-            fit = _fit_off_bands(fit, chosen, nearby, spacing)
+        if is_final:
+            fit = fit_measured(model, chosen, nearby, 3.0 * sigma, spacing)
+        else:
+            fit = _fit_to(model, chosen, nearby, 3.0 * sigma, False)
         if fit is None:
             return None
         misfit = section_misfit(clock[within], near.residual[within], extent.arc)
@@ -229,6 +230,38 @@ def _fit_to(
     if fit is None or abs(fit.model.radius - model.radius) > MAX_RADIUS_CHANGE * model.radius:
         return None
     return fit
+
+
+def fit_measured(
+    model: LineSurface | ArcSurface,
+    thinned: Indices,
+    nearby: NearbyPoints,
+    scale: float,
+    spacing: float,
+) -> SurfaceFit[Any] | None:
+    """Fit a model as elements are measured: to all points, free of bands around the pipe.
+
+    Parameters
+    ----------
+    model : LineSurface or ArcSurface
+        Where to start.
+    thinned : ndarray of int
+        Thinned points on the surface.
+    nearby : NearbyPoints
+    scale : float
+        Distance from the surface up to which points count in full, metres.
+    spacing : float
+        Distance between neighbouring thinned points, metres.
+
+    Returns
+    -------
+    SurfaceFit or None
+        None where the points do not carry the surface, or carry quite another one.
+    """
+    fit = _fit_to(model, thinned, nearby, scale, True)
+    if fit is None or not isinstance(fit.model, LineSurface):
+        return fit
+    return _fit_off_bands(fit, thinned, nearby, spacing)
 
 
 def _fit_off_bands(

@@ -99,9 +99,23 @@ def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str
         ("Coordinates", f"{cloud.crs or 'reference system not known'}, in {unit}"),
         ("Acceptance rule", f"{rule.title} ({rule.source})"),
     ]
+    facts += [("Detected again", text) for text in _own_settings(result)]
     if result.seconds:
         facts.append(("Time taken", f"{sum(result.seconds.values()):.0f} s"))
     return facts
+
+
+def _own_settings(result: Result) -> Iterator[str]:
+    """With what elements were detected again whose settings differ from those of the others."""
+    for settings in dict.fromkeys(result.own_settings.values()):
+        own = (e for e in result.elements if result.settings_of(e.element_id) == settings)
+        rows = (
+            _setting_row(key, spec, settings)
+            for key, spec in iterate_fields()
+            if settings.get(key) != result.settings.get(key)
+        )
+        values = "; ".join(f"{row['label']}: {row['value']}" for row in rows)
+        yield f"{_listed([e.label for e in own])} ({values})"
 
 
 def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]:
@@ -209,7 +223,7 @@ def _element_table(result: Result) -> dict[str, Any]:
         rows.append(
             [
                 e.label,
-                str(e.run_id),
+                result.run_names.get(e.run_id, str(e.run_id)),
                 VERDICT_ORDER[rank] if rank < len(VERDICT_ORDER) else "",
                 e.nominal.name if e.nominal else "",
                 radius,

@@ -5,7 +5,9 @@ coordinates in metres, and world coordinates in the file's unit are
 ``(local + origin) / metres_per_unit``. ``null`` stands for what could not be measured.
 A kind of axis has its own keys: ``line`` has start, direction and length, ``arc`` has
 centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
-length. A reader refuses a larger `format_version`; keys may be added within a version.
+length. ``settings`` are those of the detection, ``own_settings`` those of elements that
+were detected again with others, by element id. A reader refuses a larger
+`format_version`; keys may be added within a version.
 """
 
 import dataclasses
@@ -46,6 +48,8 @@ def result_to_dict(result: Result) -> dict[str, Any]:
         "settings": result.settings.to_dict(),
         "seconds": _plain(result.seconds),
         "edits": list(result.edits),
+        "run_names": {str(i): name for i, name in result.run_names.items()},
+        "own_settings": {str(i): s.to_dict() for i, s in result.own_settings.items()},
         "stacks": _plain(result.stacks),
         "elements": _plain(result.elements),
         "profiles": _plain(result.profiles),

@@ -55,6 +55,7 @@ ELEMENT_COLUMNS = (
     "gaps_m",
     "not_measurable",
     "name",
+    "run_name",
 )
 
 PROFILE_COLUMNS = (
@@ -214,6 +215,7 @@ def _element_row(element: Element, result: Result, place: FileCoordinates) -> li
         cell(sum(end - start for start, end in element.gaps), 4),
         _reasons(element.not_measurable),
         text_cell(element.name),
+        text_cell(result.run_names.get(element.run_id, "")),
     ]
 
 

@@ -291,3 +291,41 @@ def test_that_a_dent_no_longer_names_a_bend_that_was_deleted(simulated, result, 
     [alone] = editing.delete_elements(result, [bend]).deformations_of(dented)
     assert alone.fitting_id == NO_ID
     assert np.isnan(alone.fitting_distance)
+
+
+def test_that_a_run_has_a_name_until_it_is_taken_back_or_gone(result, dented):
+    run_id = result.element(dented).run_id
+    named = editing.name_run(result, run_id, "  Cooling   water ")
+    assert named.run_label(run_id) == "Cooling water"
+    assert named.edits[-1] == f"named run {run_id} “Cooling water”"
+    assert editing.name_run(named, run_id, "").run_label(run_id) == f"Run {run_id}"
+    ids = [e.element_id for e in named.elements if e.run_id == run_id]
+    assert run_id not in editing.delete_elements(named, ids).run_names
+    with pytest.raises(EditError):
+        editing.name_run(result, 99, "nobody")
+
+
+def test_that_the_run_of_merged_pipes_keeps_the_name_that_one_of_them_had(
+    simulated, result, halves
+):
+    first, second = (result.element(i).run_id for i in halves)
+    named = editing.name_run(result, second, "Drain")
+    merged = editing.merge_elements(simulated.cloud, named, halves)
+    assert merged.run_names == {first: "Drain"}
+
+
+def test_that_what_was_detected_again_tells_its_own_settings(simulated, result, halves, dented):
+    other = Settings().replace({"deformation.min_depth_mm": 9.0})
+    part, index = halves[0], editing.points_around(simulated.cloud, result, [halves[0]])
+    again = editing.detect_again(simulated.cloud, result, index, other, replaced=[part])
+    assert again.own_settings == {part: other}
+    assert again.settings_of(part) == other
+    assert again.settings_of(dented) == result.settings
+    # What is made of it is measured with the same; what comes back as it was has none of its own.
+    middle = 0.5 * again.element(part).axis.length
+    parted = editing.split_element(simulated.cloud, again, part, middle)
+    new = parted.elements[-1].element_id
+    assert parted.own_settings == {part: other, new: other}
+    assert editing.delete_elements(parted, [part]).own_settings == {new: other}
+    usual = editing.detect_again(simulated.cloud, again, index, result.settings, replaced=[part])
+    assert usual.own_settings == {}
