@@ -22,7 +22,7 @@ REST_MS = 250
 REST_SECONDS = 0.35
 """What drawing may take then: whoever moves on should not wait for it."""
 SETTLE_MS = 900
-SETTLED_SECONDS = 1.5
+SETTLED_SECONDS = 0.7
 """What it may take once the camera has rested for some more time."""
 RADIANS_PER_PX = np.deg2rad(0.35)
 ZOOM_PER_STEP = 0.8

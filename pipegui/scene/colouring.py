@@ -71,14 +71,22 @@ def colour_points(
 
 
 def visible_points(
-    cloud: PointCloud, result: Result | None, hidden: frozenset[int], box: Box | None = None
+    cloud: PointCloud,
+    result: Result | None,
+    hidden: frozenset[int],
+    box: Box | None = None,
+    rows: Rows = ALL,
 ) -> NDArray[np.bool_] | None:
-    """Return which points are shown by the box and not of hidden elements, None if all are."""
-    seen = None if box is None else points_in(box, cloud.xyz)
+    """Return which points are shown by the box and not of hidden elements, None if all are.
+
+    Of the `rows` of the cloud, by default of all.
+    """
+    seen = None if box is None else points_in(box, cloud.xyz[rows])
     if result is not None and hidden:
         shown = np.ones(len(result.elements) + 1, np.bool_)
         shown[[i for i in hidden if i < len(shown)]] = False
-        seen = shown[result.element_id] if seen is None else seen & shown[result.element_id]
+        is_shown = shown[result.element_id[rows]]
+        seen = is_shown if seen is None else seen & is_shown
     return seen
 
 

@@ -1,4 +1,7 @@
-"""Full density where one looks: of a large cloud, the points in the picture, once it rests."""
+"""Which points of a large cloud to draw, found beside the window.
+
+Full density where one looks: once the camera rests, all points in the picture.
+"""
 
 import threading
 from collections.abc import Callable
@@ -12,6 +15,7 @@ from pipegui.colour_maps import BLOCK
 from pipegui.scene.projection import Projection
 
 Mask = NDArray[np.bool_]
+Rows = NDArray[np.int32]
 WORTH = 0.7
 """Of the points: if more are in the picture, nothing is gained by leaving out the others."""
 
@@ -27,11 +31,42 @@ def in_picture(xyz: Floats, projection: Projection, size: tuple[int, int]) -> Ma
     return inside
 
 
-class Details(QObject):
-    """Finds the points in the picture, in a thread of its own that a move of the camera ends."""
+def rows_in_picture(
+    xyz: Floats,
+    projection: Projection,
+    size: tuple[int, int],
+    visible: Callable[[], Mask | None],
+    is_wanted: Callable[[], bool],
+) -> Rows | None:
+    """Return the rows of the `visible` points (None: all) that are in the picture.
+
+    None if these are nearly all, or no longer wanted.
+    """
+    seen = visible()
+    mask = np.zeros(len(xyz), np.bool_)
+    for start in range(0, len(xyz), BLOCK):
+        if not is_wanted():
+            return None
+        at = slice(start, start + BLOCK)
+        mask[at] = in_picture(xyz[at], projection, size)
+    if seen is not None:
+        mask &= seen
+    n_seen = len(mask) if seen is None else int(np.count_nonzero(seen))
+    if np.count_nonzero(mask) > WORTH * n_seen:
+        return None
+    return rows_of(mask)
+
+
+def rows_of(mask: Mask | None) -> Rows | None:
+    """Return the rows where a mask is true; None, which is all, stays None."""
+    return None if mask is None else np.flatnonzero(mask).astype(np.int32)
+
+
+class Finder(QObject):
+    """Finds points in a thread of its own; a new search or `stop` ends the one before."""
 
     found = Signal(object)
-    """Mask of the points, shape (n,)."""
+    """The rows of the points, shape (n,)."""
     _posted = Signal(int, object)
 
     def __init__(self, parent: QObject) -> None:
@@ -40,32 +75,17 @@ class Details(QObject):
         self._threads: list[threading.Thread] = []
         self._posted.connect(self._deliver, Qt.ConnectionType.QueuedConnection)
 
-    def look(
-        self,
-        xyz: Floats,
-        projection: Projection,
-        size: tuple[int, int],
-        visible: Callable[[], Mask | None],
-    ) -> None:
-        """Begin to find those of the `visible` points (None: all) that are in the picture."""
+    def look(self, find: Callable[[Callable[[], bool]], Rows | None]) -> None:
+        """Begin to find; `find` is given whether it is still wanted, None is no answer."""
         self.stop()
         turn = self._turn
 
         def work() -> None:
-            seen = visible()
-            mask = np.zeros(len(xyz), np.bool_)
-            for start in range(0, len(xyz), BLOCK):
-                if turn != self._turn:
-                    return
-                at = slice(start, start + BLOCK)
-                mask[at] = in_picture(xyz[at], projection, size)
-            if seen is not None:
-                mask &= seen
-            n_seen = len(mask) if seen is None else int(np.count_nonzero(seen))
-            if np.count_nonzero(mask) <= WORTH * n_seen:
-                self._posted.emit(turn, mask)
+            rows = find(lambda: turn == self._turn)
+            if rows is not None and turn == self._turn:
+                self._posted.emit(turn, rows)
 
-        thread = threading.Thread(target=work, name="points in the picture", daemon=True)
+        thread = threading.Thread(target=work, name="points to draw", daemon=True)
         self._threads = [t for t in self._threads if t.is_alive()] + [thread]
         thread.start()
 
@@ -80,6 +100,6 @@ class Details(QObject):
             thread.join()
         self._threads = []
 
-    def _deliver(self, turn: int, mask: Mask) -> None:
+    def _deliver(self, turn: int, rows: Rows) -> None:
         if turn == self._turn:
-            self.found.emit(mask)
+            self.found.emit(rows)

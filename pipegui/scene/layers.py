@@ -1,21 +1,28 @@
 """The points of the 3D view, in whichever of three layers suits the moment."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QPointF
 
+from pipecore.types import PointCloud
 from pipegui.colour_maps import Colours
 from pipegui.document import Box
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.colouring import colour_points, visible_points
-from pipegui.scene.details import Details, Mask
+from pipegui.scene.details import Finder, Mask, rows_in_picture, rows_of
 from pipegui.scene.picking import pick_point
-from pipegui.scene.point_layer import PointLayer
+from pipegui.scene.point_layer import MOVING_LEVEL, PointLayer
 from pipegui.scene.projection import Projection
+from pipegui.scene.spreading import Spread
 from pipegui.view_state import SceneState
 
 COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 NO_LIMIT = 2**31
+AT_ONCE = 1_000_000
+"""Of more points than these, the window does not wait to know which are to be seen: so many,
+spread over all, do until it is known."""
 
 
 class Layers(QObject):
@@ -34,14 +41,15 @@ class Layers(QObject):
         """Whether it is drawn on a dark background."""
         self.whole, self.close_up, self.preview = (PointLayer(canvas.layers[0]) for _ in range(3))
         self.shown = self.whole
-        self._details = Details(self)
+        self._details, self._subset = Finder(self), Finder(self)
         self._details.found.connect(self._show_close_up)
+        self._subset.found.connect(self._show_subset)
         canvas.settled.connect(self._look_closer)
         for layer in (self.whole, self.close_up, self.preview):
             canvas.drawn.connect(layer.learn)
 
     def update(self, state: SceneState, before: SceneState, *, everything: bool) -> None:
-        """Show the points of `state` where they differ from `before`."""
+        """Show the points of `state` where they differ from `before`, first a part of many."""
         self._state = state
         cloud, view = state.cloud, state.view
         if cloud is None:
@@ -61,13 +69,32 @@ class Layers(QObject):
             or view.clip_box != before.view.clip_box
         )
         if is_other_subset:
-            self.whole.set_points(cloud, self._visible(view.clip_box), self._colour)
+            self._choose(cloud, view.clip_box)
         elif is_recoloured:
             self.whole.set_colours(self._colour)
         else:
             return
         self._end_close_up()
-        self._canvas.settle_again()
+        if len(self.whole) > MOVING_LEVEL or len(cloud) > AT_ONCE:
+            self._canvas.move_to(self._canvas.pose)  # few points now, all when there is time
+        else:
+            self._canvas.settle_again()
+
+    def _choose(self, cloud: PointCloud, box: Box | None) -> None:
+        """Show the points that are to be seen; of a large cloud, a part until all are known."""
+        self._subset.stop()
+        is_whole = box is None and not self._state.view.hidden_elements
+        if is_whole or len(cloud) <= AT_ONCE:
+            self.whole.set_points(cloud, rows_of(self._visible(box)), self._colour)
+            return
+        self.whole.set_points(cloud, self._sample(box), self._colour)
+        self._subset.look(lambda _: rows_of(self._visible(box)))
+
+    def _show_subset(self, rows: NDArray[np.int32]) -> None:
+        if self._state.cloud is not None:
+            self.whole.set_points(self._state.cloud, rows, self._colour)
+            self._end_close_up()
+            self._canvas.move_to(self._canvas.pose)
 
     def show(self, projection: Projection) -> None:
         """Draw the layer that suits the moment, with as many points as there is time for."""
@@ -102,13 +129,14 @@ class Layers(QObject):
         """Draw what is in the box, of points that need not have been in it before."""
         if self._state.cloud is not None:
             self.preview.seconds_per_point = self.whole.seconds_per_point
-            self.preview.set_points(self._state.cloud, self._visible(None), self._colour)
+            self.preview.set_points(self._state.cloud, self._sample(None), self._colour)
             self.preview.clip(box)
 
     def forget(self) -> None:
         """Let go of the cloud."""
         self._end_close_up()
         self._details.close()
+        self._subset.close()
         self._state = SceneState()
         for layer in (self.whole, self.close_up, self.preview):
             layer.forget()
@@ -118,6 +146,17 @@ class Layers(QObject):
         if state.cloud is None:
             return None
         return visible_points(state.cloud, state.result, state.view.hidden_elements, box)
+
+    def _sample(self, box: Box | None) -> NDArray[np.int32] | None:
+        """Rows that are to be seen, of so many that this takes no time; None: all are."""
+        state = self._state
+        if state.cloud is None or (box is None and not state.view.hidden_elements):
+            return None
+        if len(state.cloud) <= AT_ONCE:
+            return rows_of(self._visible(box))
+        rows = Spread(len(state.cloud)).rows(0, AT_ONCE)
+        hidden = state.view.hidden_elements
+        return rows[visible_points(state.cloud, state.result, hidden, box, rows)].astype(np.int32)
 
     def _colour(self, rows: NDArray[np.int32]) -> Colours:
         state = self._state
@@ -131,12 +170,13 @@ class Layers(QObject):
             return
         size = (canvas.width(), canvas.height())
         box = view.clip_box
-        self._details.look(cloud.xyz, canvas.projection(), size, lambda: self._visible(box))
+        find = partial(rows_in_picture, cloud.xyz, canvas.projection(), size)
+        self._details.look(partial(find, lambda: self._visible(box)))
 
-    def _show_close_up(self, mask: Mask) -> None:
+    def _show_close_up(self, rows: NDArray[np.int32]) -> None:
         if self._state.cloud is not None and not self._canvas.is_moving:
             self.close_up.seconds_per_point = self.whole.seconds_per_point
-            self.close_up.set_points(self._state.cloud, mask, self._colour)
+            self.close_up.set_points(self._state.cloud, rows, self._colour)
             self._canvas.draw()
 
     def _end_close_up(self) -> None:

@@ -25,9 +25,9 @@ MOVING_SECONDS = 0.06
 """For the points of a frame while the camera moves: the rest of 0.1 s is for all else."""
 FRAME_SECONDS = 0.02
 """What a frame costs without points, about."""
-MOST_WITHOUT_CARD = 5_000_000
+MOST_WITHOUT_CARD = 2_000_000
 """At most so many points at rest where memory has to stand in for a graphics card: each takes
-over 100 bytes there, and a large window has fewer pixels."""
+nearly 200 bytes there, and a large window has no more pixels. See `details` for what is near."""
 MIN_POINT_PX, MAX_POINT_PX = 1.0, 5.0
 
 Rows = NDArray[np.int32]
@@ -61,6 +61,7 @@ class _Slice:
     colours: Colours
     actor: vtkActor
     is_uploaded: bool = False
+    is_coloured: bool = True
 
 
 class PointLayer:
@@ -109,25 +110,23 @@ class PointLayer:
         raise IndexError(row)
 
     def set_points(
-        self, cloud: PointCloud, visible: NDArray[np.bool_] | None, colour: ColourRows
+        self, cloud: PointCloud, visible: NDArray[np.integer] | None, colour: ColourRows
     ) -> None:
-        """Show the `visible` points (None: all) of a cloud."""
+        """Show the points of a cloud in the rows `visible` (None: all)."""
         is_new = cloud is not self._cloud
         self.clear_actors()
         if is_new:
             self.spacing = estimate_spacing(cloud.xyz)
         self._cloud, self._colour = cloud, colour
-        self._visible = None if visible is None else np.flatnonzero(visible).astype(np.int32)
+        self._visible = None if visible is None else visible.astype(np.int32, copy=False)
         self._spread = Spread(len(cloud) if self._visible is None else len(self._visible))
         self._reach(SMALLEST_SLICE)
 
     def set_colours(self, colour: ColourRows) -> None:
-        """Recolour the points."""
+        """Recolour the points, each slice when it is drawn next."""
         self._colour = colour
         for part in self._slices:
-            part.colours[:] = colour(part.rows)
-            part.actor.GetMapper().GetInput().GetPointData().GetScalars().Modified()
-            part.is_uploaded = False
+            part.is_coloured = False
 
     def show(
         self, *, seconds: float, pixel_size: float, visible: bool = True, size: float = 1.0
@@ -139,6 +138,8 @@ class PointLayer:
         limit = (seconds or MOVING_SECONDS) / self.seconds_per_point
         limit = min(max(limit, MOVING_LEVEL), self.most) if seconds else min(limit, MOVING_LEVEL)
         shown = self._reach(limit) if visible else []
+        for part in shown:
+            self._recolour(part)
         self.n_shown = shown[-1].stop if shown else 0
         self._is_drawing_new = not all(part.is_uploaded for part in shown)
         if shown:
@@ -188,6 +189,14 @@ class PointLayer:
             self._slices.append(self._make_slice(start, stop))
         return [s for i, s in enumerate(self._slices) if i == 0 or s.stop <= limit]
 
+    def _recolour(self, part: _Slice) -> None:
+        if part.is_coloured:
+            return
+        assert self._colour is not None
+        part.colours[:] = self._colour(part.rows)
+        part.actor.GetMapper().GetInput().GetPointData().GetScalars().Modified()
+        part.is_uploaded, part.is_coloured = False, True
+
     def _make_slice(self, start: int, stop: int) -> _Slice:
         assert self._cloud is not None
         assert self._colour is not None
@@ -219,18 +228,23 @@ OUTSIDE = """
 def set_planes(actor: vtkActor, box: Box | None) -> None:
     """Let an actor draw only what the box shows."""
     mapper, shader = actor.GetMapper(), actor.GetShaderProperty()
-    mapper.RemoveAllClippingPlanes()
     shader.ClearFragmentShaderReplacement(CLIP, True)
+    planes = mapper.GetClippingPlanes()
     if box is None:
+        if planes is not None and planes.GetNumberOfItems():
+            mapper.RemoveAllClippingPlanes()
         return
     if box.is_inverted:
         shader.AddFragmentShaderReplacement(CLIP, True, OUTSIDE, False)
-    for corner, sign in ((box.low, 1.0), (box.high, -1.0)):
-        for axis in range(3):
+    if planes is None or not planes.GetNumberOfItems():
+        for normal in (*np.eye(3), *-np.eye(3)):
             plane = vtkPlane()
-            plane.SetOrigin(corner)
-            plane.SetNormal(sign * np.eye(3)[axis])
+            plane.SetNormal(normal)
             mapper.AddClippingPlane(plane)
+    # Other planes would make VTK upload all points again; these are only moved.
+    planes = mapper.GetClippingPlanes()
+    for i in range(planes.GetNumberOfItems()):
+        planes.GetItem(i).SetOrigin(box.low if i < 3 else box.high)
 
 
 def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:
