@@ -74,13 +74,15 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
         surface = points.sample_surface(settings.thinning, progress)
     with _timed(seconds, "stacks"):
         stacks = choose_stacks(surface, settings.stacks, progress, points.local_axes)
-    overlay, found = Overlay(len(surface.xyz), points.allocate), []
+        overlay, found = Overlay(len(surface.xyz), points.allocate), []
+        uneven = points.leave_out_planes(surface, overlay.add_planes, settings, progress)
     for stack, span in _shares(stacks):
         # Stack by stack: the curves of all together need more memory than the cloud.
         with _timed(seconds, "profiles"):
-            for curve_points, starts, own in points.cut(surface, stack, settings, progress, span):
+            for curve_points, starts, own in points.cut(uneven, stack, settings, progress, span):
                 overlay.add(curve_points, starts)
                 found.append(own)
+    del uneven
     with _timed(seconds, "segments"):
         segments = overlay.number_segments(progress)
         behind = points.behind(surface)

@@ -4,7 +4,8 @@ In memory they are taken together. `pipecore.tiling` has a workspace of files fo
 are larger, with the same results.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -17,7 +18,7 @@ from pipecore.profiles import Curves, segment_profiles
 from pipecore.progress import Progress, Renamed, in_chunks
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.stacks.directions import local_axes
-from pipecore.surface import Surface, sample_surface
+from pipecore.surface import Surface, planes_of_points, sample_surface
 from pipecore.types import PointCloud, Stack
 
 Array = NDArray[np.float64]
@@ -25,6 +26,26 @@ Behind = tuple[NDArray[np.int64], NDArray[np.int64]]
 """The cloud's points in the order of their thinned points, and where those of each begin."""
 Cut = tuple[NDArray[np.int32], NDArray[np.int64], Ellipses]
 """The thinned points of some curves, where those of each begin, and the curves' ellipses."""
+
+
+JoinPlanes = Callable[[int, NDArray[np.int32]], None]
+"""Told the planes of the thinned points from one on, by number, below 0 for none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """What the stacks cut of a surface: all but the inner parts of planes.
+
+    Parameters
+    ----------
+    surface : Surface
+        In memory these points only; else all of them, and files tell which are cut.
+    rows : ndarray of int32
+        Their places among all of the surface; empty where files tell.
+    """
+
+    surface: Surface
+    rows: NDArray[np.int32]
 
 
 class Workspace(Protocol):
@@ -52,9 +73,15 @@ class Workspace(Protocol):
         """Directions of the local axis at sampled curved places of the surface."""
         ...
 
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
+    ) -> Uneven:
+        """Find the planes of the surface, tell them to `join`, return what is to be cut."""
+        ...
+
     def cut(
         self,
-        surface: Surface,
+        uneven: Uneven,
         stack: Stack,
         settings: Settings,
         progress: Progress,
@@ -84,17 +111,29 @@ class InMemory:
         """See `Workspace`."""
         return local_axes(surface, progress)
 
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
+    ) -> Uneven:
+        """See `Workspace`."""
+        max_radius = settings.elements.max_radius_mm / 1e3
+        plane, is_cut = planes_of_points(
+            surface.xyz, surface.normals, surface.voxel, max_radius, progress
+        )
+        join(0, plane)
+        rows = np.flatnonzero(is_cut).astype(np.int32)
+        return Uneven(surface.part(rows), rows)
+
     def cut(
         self,
-        surface: Surface,
+        uneven: Uneven,
         stack: Stack,
         settings: Settings,
         progress: Progress,
         span: tuple[float, float],
     ) -> Iterator[Cut]:
         """See `Workspace`."""
-        curves, ellipses = cut_and_fit(surface, stack, settings, progress, span)
-        yield curves.points, curves.starts, ellipses
+        curves, ellipses = cut_and_fit(uneven.surface, stack, settings, progress, span)
+        yield uneven.rows[curves.points], curves.starts, ellipses
 
 
 def cut_and_fit(

@@ -15,6 +15,22 @@ def unite_groups(points, starts, parents):
 
 
 @njit(cache=True, nogil=True)
+def unite_labelled(labels, start, first, parents):
+    """Unite the points of each label, none if below 0; `labels` are those of points `start` on.
+
+    `first` keeps the first point of each label from call to call, -1 before it is met.
+    """
+    for row in range(labels.shape[0]):
+        label = labels[row]
+        if label < 0:
+            continue
+        if first[label] < 0:
+            first[label] = start + row
+        else:
+            unite(parents, first[label], start + row)
+
+
+@njit(cache=True, nogil=True)
 def flatten(parents):
     """Point every element at its root."""
     for i in range(parents.shape[0]):

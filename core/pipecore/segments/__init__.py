@@ -31,6 +31,7 @@ class Overlay:
     def __init__(self, n_points: int, allocate: Allocate = in_memory) -> None:
         self._allocate = allocate
         self._parents: NDArray[np.int32] = allocate("parents", (n_points,), np.int32)
+        self._first_of_plane = np.empty(0, np.int64)
         for start in range(0, n_points, BLOCK):
             stop = min(start + BLOCK, n_points)
             self._parents[start:stop] = np.arange(start, stop)
@@ -38,6 +39,17 @@ class Overlay:
     def add(self, points: NDArray[np.int32], starts: NDArray[np.int64]) -> None:
         """Join the points that share a curve: rows starts[c] … starts[c + 1] of `points`."""
         components.unite_groups(points, starts, self._parents)
+
+    def add_planes(self, start: int, plane: NDArray[np.int32]) -> None:
+        """Join the points of each plane: `plane` has the numbers of those from `start` on.
+
+        Numbers count from 0; points with lower ones are of no plane.
+        """
+        n_more = int(plane.max(initial=-1)) + 1 - len(self._first_of_plane)
+        if n_more > 0:
+            unknown = np.full(n_more, -1, np.int64)
+            self._first_of_plane = np.concatenate([self._first_of_plane, unknown])
+        components.unite_labelled(plane, start, self._first_of_plane, self._parents)
 
     def number_segments(self, progress: Progress = NoProgress()) -> NDArray[np.int32]:
         """Return the segment of each point, 1 for the largest; `NO_ID` for points of none."""

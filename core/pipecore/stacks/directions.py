@@ -64,7 +64,7 @@ def axes_at(
             xyz, normals, *grid.lookup, radius, place, start, stop, axes, spreads
         )
 
-    for_chunks(work, len(sample), 2_000, "directions", progress)
+    for_chunks(work, len(sample), 2_000, "directions", progress, (0.0, 0.8))
     with np.errstate(invalid="ignore"):
         is_curved = (spreads[:, 1] > CURVED) & (spreads[:, 0] < 0.25 * spreads[:, 1])
     return axes[is_curved]

@@ -10,6 +10,7 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import CellGrid, cells_of
+from pipecore.surface.planes import planes_of_points
 from pipecore.surface.spacing import median_spacing
 from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
 from pipecore.types import PointCloud
@@ -23,6 +24,7 @@ __all__ = [
     "estimate_normals",
     "fit_planes",
     "median_spacing",
+    "planes_of_points",
     "sample_surface",
     "thin",
 ]
@@ -66,6 +68,17 @@ class Surface:
     def tolerance(self) -> float:
         """Distance within which points count as being on their curve, metres."""
         return max(0.25 * self.voxel, 3.0 * self.noise, 0.002)
+
+    def part(self, rows: NDArray[np.integer]) -> "Surface":
+        """Some of the points, without those of the cloud behind them."""
+        return Surface(
+            self.xyz[rows],
+            self.normals[rows],
+            self.spacing[rows],
+            np.empty(0, np.int32),
+            self.voxel,
+            self.noise,
+        )
 
 
 def fit_planes(

@@ -66,8 +66,18 @@ class GridFrame:
 
     def keys(self, xyz: NDArray[np.floating]) -> NDArray[np.int64]:
         """Return the number of the cell of each point (n, 3)."""
-        i = cells_of(xyz, self.edge).astype(np.int64) - self.first
+        return self.keys_of_cells(cells_of(xyz, self.edge).astype(np.int64))
+
+    def keys_of_cells(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the numbers of cells (n, 3), which count from the local zero."""
+        i = cells - self.first
         return np.asarray((i[:, 0] * self.n_y + i[:, 1]) * self.n_z + i[:, 2])
+
+    def cells_of_keys(self, keys: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the cells (n, 3) that have the given numbers."""
+        rows, z = np.divmod(keys, self.n_z)
+        x, y = np.divmod(rows, self.n_y)
+        return np.stack([x, y, z], axis=1) + self.first
 
 
 def bounds(xyz: NDArray[np.floating]) -> tuple[Array, Array]:

@@ -19,11 +19,12 @@ from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
 from pipecore.surface import Surface
+from pipecore.surface.planes import CellSums, find_planes, sum_cells
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.store import StopWhenUnwanted, Store
 from pipecore.tiling.thinning import Rows, TiledSurface
 from pipecore.types import Stack
-from pipecore.workspace import Cut, cut_and_fit
+from pipecore.workspace import Cut, JoinPlanes, cut_and_fit
 
 Array = NDArray[np.float64]
 
@@ -53,6 +54,22 @@ def local_axes_in_slabs(engine: Engine, tiled: TiledSurface, progress: Progress)
         own = positions[(positions >= end - n) & (positions < end)] - (end - n)
         tiles.append((slab.surface, tiled.rows_of(slab, REACH), own, tiled.surface.voxel))
     return np.concatenate(engine.run(axes_of_slab, tiles, "directions", progress))
+
+
+def leave_out_planes(
+    engine: Engine, tiled: TiledSurface, join: JoinPlanes, max_radius: float, progress: Progress
+) -> None:
+    """Find the planes and tell them; write for each slab which of its points are cut."""
+    store, voxel = engine.store, tiled.surface.voxel
+    tiles = [(k, slab.surface, voxel) for k, slab in enumerate(tiled.slabs)]
+    parts = engine.run(sum_slab_cells, tiles, "directions", progress, (0.8, 1.0))
+    known = find_planes(parts, voxel, max_radius)
+    for k, (slab, cells) in enumerate(zip(tiled.slabs, known, strict=True)):
+        progress.update("directions", 1.0)
+        ids = store.open(f"cells-{k}")
+        join(slab.surface[0], cells.plane[ids])
+        store.save(f"cut-{k}", np.flatnonzero(cells.is_cut[ids]).astype(np.int32))
+        store.remove(f"cells-{k}")
 
 
 def cut_in_batches(
@@ -124,13 +141,25 @@ def axes_of_slab(
     return axes_at(xyz, normals, sample, voxel, StopWhenUnwanted(store))
 
 
+def sum_slab_cells(store: Store, number: int, rows: Rows, voxel: float) -> CellSums:
+    """Sum up a slab's points by cell; write the cell of each."""
+    StopWhenUnwanted(store).update("directions", 0.0)
+    xyz, normals = (store.open(name)[slice(*rows)] for name in ("surface", "normals"))
+    sums, ids = sum_cells(xyz, normals, voxel)
+    store.save(f"cells-{number}", ids)
+    return sums
+
+
 def sort_slab(
     store: Store, number: int, rows: Rows, stack: Stack
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Write a slab's points that join a stack by profile; return profiles and their counts."""
     StopWhenUnwanted(store).update("profiles", 0.0)
-    xyz, normals, spacing = (store.open(n)[slice(*rows)] for n in ("surface", "normals", "spacing"))
-    profile = np.empty(rows[1] - rows[0], np.int32)
+    cut = store.open(f"cut-{number}")
+    xyz, normals, spacing = (
+        store.open(n)[slice(*rows)][cut] for n in ("surface", "normals", "spacing")
+    )
+    profile = np.empty(len(cut), np.int32)
     kernels.find_profiles(
         xyz, normals, spacing, 0, len(profile), stack.direction, stack.width, stack.offset,
         MAX_SLOPE, stack.min_spacing, profile,
@@ -138,7 +167,7 @@ def sort_slab(
     joins = np.flatnonzero(profile != kernels.NOT_CUT)
     keys = profile[joins].astype(np.int64)
     order = argsort_keys(keys - keys.min(initial=0))
-    store.save(f"sorted-{number}", joins[order].astype(np.int32))
+    store.save(f"sorted-{number}", cut[joins[order]])
     profiles, counts = np.unique(keys, return_counts=True)
     return profiles, counts
 

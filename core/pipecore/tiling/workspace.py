@@ -9,11 +9,11 @@ from pipecore.allocation import Allocate
 from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.surface import Surface
-from pipecore.tiling.curves import cut_in_batches, local_axes_in_slabs
+from pipecore.tiling.curves import cut_in_batches, leave_out_planes, local_axes_in_slabs
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
 from pipecore.types import PointCloud, Stack
-from pipecore.workspace import Behind, Cut
+from pipecore.workspace import Behind, Cut, JoinPlanes, Uneven
 
 
 class InTiles:
@@ -52,9 +52,17 @@ class InTiles:
         """See `Workspace`."""
         return local_axes_in_slabs(self._engine, self._known(), progress)
 
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
+    ) -> Uneven:
+        """See `Workspace`."""
+        max_radius = settings.elements.max_radius_mm / 1e3
+        leave_out_planes(self._engine, self._known(), join, max_radius, progress)
+        return Uneven(surface, np.empty(0, np.int32))
+
     def cut(
         self,
-        surface: Surface,
+        uneven: Uneven,
         stack: Stack,
         settings: Settings,
         progress: Progress,

@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 from pipecore.geometry import LineAxis
 from pipecore.profiles import Curves, segment_profiles, stack_frame
 from pipecore.progress import NoProgress
-from pipecore.segments import MIN_SEGMENT, overlay_stacks
+from pipecore.segments import MIN_SEGMENT, Overlay, overlay_stacks
 from pipecore.settings import ProfileSettings
 from pipecore.types import NO_ID, Stack
 from tests.core.shapes import part_of, sampled, tube
@@ -31,6 +31,24 @@ def test_that_curves_of_different_stacks_with_a_common_point_are_one_segment():
     assert_array_equal(segments[:60], 1)
     assert_array_equal(segments[60:70], NO_ID)
     assert_array_equal(segments[70:], 2)
+
+
+def test_that_planes_are_segments_with_the_curves_that_reach_into_them():
+    plane = np.full(120, -1, np.int32)
+    plane[:40], plane[40:70] = 0, 1
+    overlay = Overlay(len(plane))
+    for start in (0, 30, 60):
+        overlay.add_planes(start, plane[start : start + 30])
+    overlay.add_planes(90, plane[90:])
+    # The stack was cut out of every other point: its first curve is 0, 2 … 8, 100, 102 … 118.
+    rows = np.arange(0, 120, 2)
+    curves = curves_of([np.r_[0:5, 50:60], np.arange(40, 45)])
+    overlay.add(rows[curves.points].astype(np.int32), curves.starts)
+    segments = overlay.number_segments()
+    assert_array_equal(segments[:40], 1)
+    assert_array_equal(segments[100::2], 1)
+    assert_array_equal(segments[40:70], 2)
+    assert_array_equal(segments[71:100], NO_ID)
 
 
 def test_that_segments_are_numbered_from_the_largest_and_small_ones_are_none(rng):
