@@ -7,7 +7,7 @@ from PySide6.QtGui import QGuiApplication
 
 from pipecore.types import ReviewState
 from pipegui import commands, cuts, describe, edit_commands, files, theme, view_commands
-from pipegui.document import Background, Tool
+from pipegui.document import Background, ProfileKey, Tool
 from pipegui.kept_choices import keep, keep_tab
 from pipegui.menus import VIEW_OPTIONS
 from pipegui.panel_focus import go_to_next_panel
@@ -166,9 +166,11 @@ def connect_views(window: "MainWindow") -> None:
     parts.radius_plot.profile_clicked.connect(
         lambda stack, index: do(commands.select_profile, stack, index)
     )
+    parts.radius_plot.profile_hovered.connect(lambda key: _mark_profile(window, key))
     parts.radius_plot.stack_chosen.connect(lambda i: do(commands.show_plot_stack, i))
     parts.radius_plot.pin_toggled.connect(lambda: do(commands.toggle_pin))
     parts.radius_plot.pins_cleared.connect(lambda: do(commands.set_view, pinned_elements=()))
+    parts.section.spot_hovered.connect(lambda place: _mark_in_scene(window, place))
     parts.section.step_requested.connect(lambda by: do(commands.step_profile, by))
     parts.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
     parts.map.spot_hovered.connect(lambda place: _mark_in_scene(window, place))
@@ -187,6 +189,15 @@ def _mark_in_scene(window: "MainWindow", place: tuple[float, float] | None) -> N
     if place is not None and result is not None and element_id:
         spot = cuts.spot_on_surface(result, element_id, *place)
     window.parts.scene.mark_spot(spot)
+
+
+def _mark_profile(window: "MainWindow", key: ProfileKey | None) -> None:
+    """Show in 3D which profile the cursor is at in the radius plot."""
+    result, element_id = window.document.result, window.document.selection.element_id
+    profile = None
+    if key is not None and result is not None and element_id:
+        profile = cuts.profile_at(result, element_id, key)
+    window.parts.scene.mark_profile(profile)
 
 
 def _mark_on_map(window: "MainWindow", point_index: int) -> None:

@@ -20,6 +20,7 @@ from pipecore.types import Element, Profiles
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.colours import VERDICT
+from pipegui.document import ProfileKey
 from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, small
 from pipegui.plots.export import Table
@@ -55,6 +56,8 @@ class RadiusPlot(Chart):
 
     profile_clicked = Signal(int, int)
     """Stack id and profile index."""
+    profile_hovered = Signal(object)
+    """The `ProfileKey` of the profile under the cursor, None for none."""
     stack_chosen = Signal(int)
     pin_toggled = Signal()
     """The present element is to stay in the plot, or is not to any more."""
@@ -366,12 +369,17 @@ class RadiusPlot(Chart):
     def _click(self, plot: pg.PlotItem, position: QPointF) -> None:
         row = self._row_at(plot, position)
         if row is not None:
-            profiles = self._state.shown
-            self.profile_clicked.emit(int(profiles.stack_id[row]), int(profiles.profile_index[row]))
+            key = self._key_of(row)
+            self.profile_clicked.emit(key.stack_id, key.profile_index)
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
         row = self._row_at(plot, position) if plot is not None else None
         self.readout.setText("" if row is None else self._row_text(row))
+        self.profile_hovered.emit(None if row is None else self._key_of(row))
+
+    def _key_of(self, row: int) -> ProfileKey:
+        profiles = self._state.shown
+        return ProfileKey(int(profiles.stack_id[row]), int(profiles.profile_index[row]))
 
     def _row_text(self, row: int) -> str:
         profiles = self._state.shown

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
 from pipecore.report.format import cell
+from pipecore.types import OWN_STACK
 from pipegui import theme
 from pipegui.colour_maps import QUALITATIVE
 from pipegui.plots.chart import Chart, faint
@@ -50,6 +51,8 @@ class SectionView(Chart):
 
     step_requested = Signal(int)
     """How many profiles further: -1 or 1, or many."""
+    spot_hovered = Signal(object)
+    """Chainage and clock (radians) of the point under the cursor, None for none."""
     choices_changed = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
@@ -334,19 +337,32 @@ class SectionView(Chart):
         self.step_requested.emit(step)
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        self.readout.setText(self._text_at(position) if plot is self.plot else "")
+        point = self._point_at(position) if plot is self.plot else None
+        self.readout.setText("" if point is None else self._text_of(point))
+        self.spot_hovered.emit(None if point is None else self._spot_of(point))
 
-    def _text_at(self, position: QPointF) -> str:
+    def _point_at(self, position: QPointF) -> Array | None:
+        """Millimetres in the plane of the point that is drawn near `position`, shape (1, 2)."""
         cut = self._state.cut
         if cut is None or not len(cut.points_uv):
-            return ""
+            return None
         at = self.plot.vb.mapSceneToView(position)
         drawn = exaggerate(cut.points_uv, cut.reference, self.factor.value())
         away = np.hypot(*(drawn - (at.x(), at.y())).T) / self.plot.vb.viewPixelSize()[0]
         nearest = int(np.argmin(away))
-        if away[nearest] > HOVER_PX:
-            return ""
-        value = float(deviations(cut.points_uv[nearest : nearest + 1], cut.reference)[0])
+        return None if away[nearest] > HOVER_PX else cut.points_uv[nearest : nearest + 1]
+
+    def _spot_of(self, point: Array) -> tuple[float, float] | None:
+        """Where on the element that is, if the section is square to its axis."""
+        profile, cut = self._state.profile, self._state.cut
+        if profile is None or cut is None or int(profile.stack_id[0]) != OWN_STACK:
+            return None
+        u, v = (point[0] - cut.reference.centre_uv).tolist()
+        return float(profile.chainage[0]), float(np.mod(np.arctan2(u, v), 2 * np.pi))
+
+    def _text_of(self, point: Array) -> str:
+        assert self._state.cut is not None
+        value = float(deviations(point, self._state.cut.reference)[0])
         side = tr("outward") if value > 0 else tr("inward")
         return tr("{value} {side} of the undeformed contour").format(
             value=format_measure(abs(value), unit="mm"), side=side

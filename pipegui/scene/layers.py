@@ -20,7 +20,7 @@ from pipegui.view_state import SceneState
 
 COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
 NO_LIMIT = 2**31
-AT_ONCE = 1_000_000
+AT_ONCE = 400_000
 """Of more points than these, the window does not wait to know which are to be seen: so many,
 spread over all, do until it is known."""
 

@@ -85,6 +85,8 @@ class Overlay(QWidget):
         """Of the clip box, local coordinates, shape (n, 3)."""
         self.spot: Array | None = None
         """Where another view's cursor is, local coordinates, shape (3,)."""
+        self.ring: Array | None = None
+        """The profile that a plot's cursor is at, closed, local coordinates, shape (n, 3)."""
         self.hint = ""
         """What to do next, at the top."""
         self._crosses: list[tuple[QRectF, int]] = []
@@ -118,6 +120,8 @@ class Overlay(QWidget):
             taken.append(self._draw_legend(painter, self.legend))
         if self.handles is not None:
             self._draw_handles(painter, self._projection, self.handles)
+        if self.ring is not None:
+            self._draw_ring(painter, self._projection, self.ring)
         if self.spot is not None:
             self._draw_spot(painter, self._projection, self.spot)
         if self.hint:
@@ -146,6 +150,15 @@ class Overlay(QWidget):
             painter.setPen(QPen(colour, width))
             painter.drawEllipse(at, SPOT, SPOT)
             painter.drawPoint(at)
+
+    def _draw_ring(self, painter: QPainter, projection: Projection, ring: Array) -> None:
+        pixels, _ = projection.to_screen(ring)
+        if not np.isfinite(pixels).all():
+            return
+        corners = [QPointF(x, y) for x, y in pixels.tolist()]
+        for colour, width in ((self._paper(), 5.0), (self._tint("accent"), 2.0)):
+            painter.setPen(QPen(colour, width))
+            painter.drawPolyline(corners)
 
     def _draw_hint(self, painter: QPainter, text: str) -> QRectF:
         metrics = painter.fontMetrics()

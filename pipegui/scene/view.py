@@ -9,10 +9,10 @@ from PySide6.QtGui import QCloseEvent, QColor, QImage, QResizeEvent
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from pipecore.geometry import Array
-from pipecore.types import NO_ID, PointCloud
+from pipecore.types import NO_ID, PointCloud, Profiles
 from pipegui import theme
 from pipegui.document import Background, Box, Measurement, Tool, ViewOptions
-from pipegui.scene import clipping
+from pipegui.scene import clipping, shapes
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
@@ -211,6 +211,12 @@ class SceneView(QWidget):
     def mark_spot(self, spot: Array | None) -> None:
         """Show where another view's cursor is, in local coordinates; None for nowhere."""
         self.overlay.spot = spot
+        self.overlay.update()
+
+    def mark_profile(self, profile: Profiles | None) -> None:
+        """Show which profile another view's cursor is at, a table of one row; None for none."""
+        rings = shapes.ellipses(profile) if profile is not None else ()
+        self.overlay.ring = rings[0] if len(rings) else None
         self.overlay.update()
 
     def view_direction(self) -> Array:

@@ -56,6 +56,11 @@ class FakeScene(FakeView):
     def mark_spot(self, spot: Any) -> None:
         self.spot = spot
 
+    profile: Any = None
+
+    def mark_profile(self, profile: Any) -> None:
+        self.profile = profile
+
     def fit(self) -> None:
         self.standard_views.append("fit")
 
@@ -87,6 +92,7 @@ class FakeChooser(FakeView):
 
 class FakeRadiusPlot(FakeChooser):
     profile_clicked = Signal(int, int)
+    profile_hovered = Signal(object)
     stack_chosen = Signal(int)
     pin_toggled = Signal()
     pins_cleared = Signal()
@@ -94,6 +100,7 @@ class FakeRadiusPlot(FakeChooser):
 
 class FakeSection(FakeChooser):
     step_requested = Signal(int)
+    spot_hovered = Signal(object)
 
 
 class FakePreview(FakeView):

@@ -324,6 +324,31 @@ def test_that_hovering_the_map_tells_the_spot_and_leaving_it_nothing(qtbot):
     assert told[-1] is None
 
 
+def test_that_hovering_a_point_of_the_radius_plot_tells_its_profile(radius, qtbot):
+    told = []
+    radius.profile_hovered.connect(told.append)
+    profiles = radius._state.shown
+    hover(qtbot, radius, at(radius, radius.radius, 20, 1000 * profiles.semi_minor[20]))
+    stack_id, index = int(profiles.stack_id[20]), int(profiles.profile_index[20])
+    assert told[-1] == ProfileKey(stack_id, index)
+    QApplication.sendEvent(radius, QEvent(QEvent.Type.Leave))
+    assert told[-1] is None
+
+
+def test_that_hovering_a_point_of_the_section_tells_where_on_the_pipe_it_is(section, qtbot):
+    told = []
+    section.spot_hovered.connect(told.append)
+    cut, profile = section._state.cut, section._state.profile
+    section.factor.setValue(1)
+    u, v = cut.points_uv[np.argmax(cut.points_uv[:, 0])]
+    hover(qtbot, section, at(section, section.plot, u, v))
+    chainage, clock = told[-1]
+    assert chainage == pytest.approx(profile.chainage[0])
+    assert np.hypot(u, v) * abs(np.sin(clock - np.arctan2(u, v))) < 10
+    QApplication.sendEvent(section, QEvent(QEvent.Type.Leave))
+    assert told[-1] is None
+
+
 def test_that_the_map_shows_the_cursor_of_the_3d_view(qtbot):
     plot = shown(qtbot, DeviationMap(), states(Selection(1, 2)).map)
     plot.show_cursor((0.8, np.deg2rad(300)))

@@ -19,6 +19,7 @@ from pipegui.document import (
     ViewOptions,
 )
 from pipegui.scene import pose as poses
+from pipegui.scene.shapes import ellipses
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import make_scan
@@ -420,3 +421,21 @@ def test_that_all_points_in_the_picture_are_drawn_once_a_close_view_rests(
     assert view.layers.close_up.n_shown == 0
     assert view.points.n_shown > 0
     view.close()
+
+
+def test_that_the_profile_under_a_plots_cursor_is_ringed(scene, qtbot):
+    scene.apply(scene_state(view=replace(STILL, show_points=False, show_axes=False)))
+    qtbot.waitUntil(lambda: not scene.canvas.is_moving)
+    with qtbot.waitSignal(scene.canvas.drawn):
+        scene.canvas.draw()
+    before = picture(scene)
+    profile = RESULT.profiles.of_element(2)[5:6]
+    scene.mark_profile(profile)
+    rows, columns = np.nonzero(np.abs(picture(scene) - before).max(axis=2) > 60)
+    ring, _ = scene.canvas.projection().to_screen(ellipses(profile)[0])
+    assert len(rows) > 20
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    assert [columns.min(), rows.min()] == pytest.approx(low, abs=5)
+    assert [columns.max(), rows.max()] == pytest.approx(high, abs=5)
+    scene.mark_profile(None)
+    assert np.array_equal(picture(scene), before)

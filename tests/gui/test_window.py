@@ -582,6 +582,19 @@ def test_that_the_plots_are_headed_by_what_they_show(detected):
     assert dock.windowTitle() == "Element"
 
 
+def test_that_the_profile_under_the_cursor_of_the_radius_plot_is_marked_in_3d(detected):
+    from pipegui import commands
+
+    detected.do(commands.select_element, 2)
+    parts = detected.parts
+    profiles = detected.document.result.profiles.of_element(2)
+    key = ProfileKey(int(profiles.stack_id[5]), int(profiles.profile_index[5]))
+    parts.radius_plot.profile_hovered.emit(key)
+    assert parts.scene.profile.chainage == pytest.approx(profiles.chainage[5:6])
+    parts.radius_plot.profile_hovered.emit(None)
+    assert parts.scene.profile is None
+
+
 def test_that_the_cursor_on_the_map_is_marked_in_3d_and_the_other_way_round(detected):
     from pipegui import commands
 
