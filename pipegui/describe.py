@@ -30,6 +30,7 @@ from pipecore.types import (
 )
 from pipegui.cuts import stack_name
 from pipegui.document import Scan, Selection
+from pipegui.reasons import reason_text
 from pipegui.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.view_state import PropertiesState
 
@@ -258,7 +259,7 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
         unit="%",
         hint=OVALITY
         if math.isfinite(element.ovality)
-        else element.not_measurable.get("ovality", too_short),
+        else reason_text(element.not_measurable.get("ovality", too_short)),
     )
     off_axis = tr("Largest distance of the measured axis from the fitted one.")
     yield _measure(tr("Straightness"), element.straightness, hint=off_axis)
@@ -316,7 +317,7 @@ def _of_deformation(
     yield Property(
         tr("Clock"), clock, clock, hint=tr("Looking along increasing chainage, 12:00 up.")
     )
-    why = deformation.not_measurable
+    why = {name: reason_text(text) for name, text in deformation.not_measurable.items()}
     if deformation.kind is DeformationKind.OVALITY:
         hint = why.get("ovality", OVALITY)
         yield _measure(tr("Ovality"), deformation.ovality, unit="%", hint=hint)

@@ -25,7 +25,7 @@ from pipegui.parts import Parts
 from pipegui.previewing import Previews
 from pipegui.project_file import SUFFIX
 from pipegui.projects import Projects
-from pipegui.texts import inside, tr
+from pipegui.texts import error_text, inside, tr
 from pipegui.toolbar import ToolBar
 from pipegui.view_state import PropertiesState, ViewState, WindowState, resolve
 
@@ -92,7 +92,7 @@ class MainWindow(QMainWindow):
         try:
             self.history.do(command, *args, **kwargs)
         except PipecoreError as error:
-            self.panels.message.tell(str(error), "warning")
+            self.panels.message.tell(error_text(error), "warning")
             self._apply(self._state, everything=True)
 
     # Work

@@ -15,7 +15,7 @@ from pipecore.settings import Settings
 from pipegui import commands, describe, files, theme
 from pipegui.command_search import CommandSearch
 from pipegui.shortcut_list import ShortcutList
-from pipegui.texts import LANGUAGES, inside, mark, tr
+from pipegui.texts import LANGUAGES, error_text, inside, mark, tr
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -129,7 +129,7 @@ class MenuActions:
         try:
             window.do(commands.load_settings, Settings.from_toml(path))
         except PipecoreError as error:
-            window.panels.message.tell(str(error), "error")
+            window.panels.message.tell(error_text(error), "error")
 
     def save_settings(self) -> None:
         """Ask where to, and keep the settings as a file."""
@@ -206,7 +206,8 @@ class MenuActions:
             write(path)
         except (PipecoreError, OSError) as error:
             window.panels.message.tell(
-                tr("“{path}” was not saved: {error}").format(path=path, error=error), "error"
+                tr("“{path}” was not saved: {error}").format(path=path, error=error_text(error)),
+                "error",
             )
         else:
             window.panels.message.tell(tr("Saved “{path}”.").format(path=path))

@@ -16,7 +16,7 @@ from pipegui.fingerprint import Fingerprint
 from pipegui.jobs import Jobs
 from pipegui.project_file import SUFFIX, SavedProject, read_project, work_of, write_project
 from pipegui.rescue import Rescue
-from pipegui.texts import tr
+from pipegui.texts import error_text, tr
 from pipegui.worker import JobProgress
 
 if TYPE_CHECKING:
@@ -285,7 +285,7 @@ class Projects(QObject):
                     raise
                 except ReadError as error:
                     raise ReadError(
-                        tr("The project was not opened: {error}").format(error=error)
+                        tr("The project was not opened: {error}").format(error=error_text(error))
                     ) from error
                 scans.append(scan.with_cloud(replace(cloud, source=path), fingerprint))
             return tuple(scans)

@@ -6,8 +6,11 @@ can be compared with the tables of a report.
 """
 
 import gettext
+from enum import StrEnum
+from types import SimpleNamespace
 from typing import Any
 
+from pipecore.errors import PipecoreError
 from pipecore.report.format import NOT_MEASURABLE
 from pipecore.report.format import format_measure as _format_measure
 from pipecore.resources import resource
@@ -16,6 +19,8 @@ from pipecore.types import Element, Result
 LANGUAGES = {"": "As the system", "en": "English", "de": "Deutsch"}
 """Names of the languages by their codes, each in its own; "" is the system's."""
 DOMAIN = "pipegui"
+TRANSLATED_VALUES = ("cause", "reason", "shape")
+"""What the core's errors call values that are texts of the core too; the others are names."""
 KEEPS_CAPITALS = ("de",)
 """Languages that write nouns with a capital within a sentence too."""
 
@@ -85,6 +90,28 @@ def label_of(element: Element) -> str:
 def run_label(result: Result, run_id: int) -> str:
     """What a run is called: its own name, else such as "Run 3"."""
     return result.run_names.get(run_id) or tr("Run {run_id}").format(run_id=run_id)
+
+
+def error_text(error: Exception) -> str:
+    """What an error says; those of the core come with what stands in their sentence."""
+    if not isinstance(error, PipecoreError):
+        return str(error)
+    spoken = {name: _spoken(name, value) for name, value in error.values.items()}
+    return tr(error.template).format(**spoken) if spoken else tr(error.template)
+
+
+def _spoken(name: str, value: object) -> object:
+    match value:
+        case PipecoreError():
+            return error_text(value)
+        case Element():
+            return SimpleNamespace(label=label_of(value))
+        case tuple() if all(isinstance(item, Element) for item in value):
+            *others, last = [label_of(element) for element in value]
+            return ", ".join(others) + tr(" and ") + last if others else last
+        case str() if isinstance(value, StrEnum) or name in TRANSLATED_VALUES:
+            return tr(value)
+    return value
 
 
 def format_measure(*args: Any, **options: Any) -> str:

@@ -18,7 +18,7 @@ from typing import Any
 from PySide6.QtCore import QObject, Qt, QTimer, Signal, Slot
 
 from pipecore.errors import CancelledError, PipecoreError
-from pipegui.texts import tr
+from pipegui.texts import error_text, tr
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def _end_of(progress: JobProgress, job: int, work: Work) -> Event:
     except CancelledError:
         return Cancelled(job)
     except PipecoreError as error:
-        return Failed(job, str(error), traceback.format_exc())
+        return Failed(job, error_text(error), traceback.format_exc())
     except MemoryError:
         return Failed(
             job,

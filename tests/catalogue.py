@@ -1,7 +1,7 @@
 """The catalogues of translations: `python -m tests.catalogue` brings them up to the sources.
 
-Texts are found where the code calls `tr`, `mark`, `trn` and `count`; those of tables that the
-core or the menus hold are taken from the tables themselves.
+Texts are found where the app calls `tr`, `mark`, `trn` and `count`, and where the core raises
+errors; those of tables that the core or the menus hold are taken from the tables themselves.
 """
 
 from collections.abc import Iterator
@@ -15,12 +15,13 @@ from babel.messages.pofile import read_po, write_po
 
 from pipecore.editing import STAGES as EDITING_STAGES
 from pipecore.io import file_filter
+from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
 from pipecore.report.format import NOT_MEASURABLE
 from pipecore.resources import resource
 from pipecore.rules import list_rules
 from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
-from pipecore.types import DeformationKind, ElementKind, ReviewState, Verdict
+from pipecore.types import SPOKEN_KIND, DeformationKind, ElementKind, ReviewState, Verdict
 from pipegui import theme
 from pipegui.document import Background, ColourBy
 from pipegui.menus import MENUS, SPECS
@@ -29,7 +30,20 @@ from pipegui.texts import DOMAIN, LANGUAGES
 
 SOURCES = Path(__file__).parents[1] / "pipegui"
 KEYWORDS = {"tr": None, "mark": None, "trn": (1, 2), "count": (1, 2)}
-MORE_STAGES = ("reading", "normals", "drawing figures", "writing result")
+CORE = Path(__file__).parents[1] / "core" / "pipecore"
+ERRORS = dict.fromkeys(("ReadError", "WriteError", "SettingsError", "EditError"))
+"""Their first argument is a text; what is left out here is never shown in the window."""
+NOT_IN_THE_APP = ("simulate", "cli", "tiling")
+MORE_STAGES = (
+    "reading",
+    "normals",
+    "drawing figures",
+    "writing",
+    "writing profiles",
+    "writing result",
+    "saving",
+    "opening",
+)
 """Stages of work that is no detection."""
 
 
@@ -54,7 +68,8 @@ def tables() -> Iterator[str]:
         yield from (str(value) for value in enum)
     for enum in (ElementKind, DeformationKind, Verdict, ReviewState):
         yield from (str(value) for value in enum)
-    yield from (element_kind_name(kind) for kind in ElementKind)
+    yield from SPOKEN_KIND.values()
+    yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():
         yield from (preset.name, preset.description)
@@ -65,20 +80,14 @@ def tables() -> Iterator[str]:
             yield name
 
 
-def element_kind_name(kind: ElementKind) -> str:
-    """What the core calls an element of a kind that has no name of its own."""
-    from pipecore import types
-
-    return types._SPOKEN_KIND[kind]
-
-
 def extract() -> Catalog:
     """Return a catalogue of all texts, untranslated, in a steady order."""
     found = Catalog(charset="utf-8", fuzzy=False)
-    for _, _, text, _, _ in sorted(
-        extract_from_dir(SOURCES, [("**.py", "python")], keywords=KEYWORDS), key=lambda m: m[:2]
-    ):
-        found.add(text)
+    for folder, keywords in ((SOURCES, KEYWORDS), (CORE, ERRORS)):
+        texts = extract_from_dir(folder, [("**.py", "python")], keywords=keywords)
+        for path, _, text, _, _ in sorted(texts, key=lambda m: m[:2]):
+            if not path.startswith(NOT_IN_THE_APP):
+                found.add(text)
     for text in tables():
         if text:
             found.add(text)

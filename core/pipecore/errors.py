@@ -6,7 +6,19 @@ class PipecoreError(Exception):
 
     The message is one sentence for the person at the screen: what happened, to
     which file or setting, and what to do.
+
+    Parameters
+    ----------
+    template : str
+        The sentence, with fields as of `str.format` for what differs from case to case;
+        an app can look up its translation.
+    **values
+        What stands in the fields. Without any, the sentence is taken as it is.
     """
+
+    def __init__(self, template: str, **values: object) -> None:
+        super().__init__(template.format(**values) if values else template)
+        self.template, self.values = template, values
 
 
 class ReadError(PipecoreError):
@@ -32,5 +44,5 @@ class SceneError(PipecoreError):
 class CancelledError(PipecoreError):
     """The user cancelled the work."""
 
-    def __init__(self, message: str = "Cancelled.") -> None:
-        super().__init__(message)
+    def __init__(self, template: str = "Cancelled.", **values: object) -> None:
+        super().__init__(template, **values)

@@ -187,10 +187,12 @@ def load_rule(name: str) -> Rule:
     path = Path(name) if is_path else resource("rules", f"{name}.toml")
     if not path.is_file():
         known = ", ".join(rule.name for rule in list_rules())
+        if is_path:
+            raise SettingsError("There is no rule file {path}.", path=path)
         raise SettingsError(
-            f"There is no rule file {path}."
-            if is_path
-            else f"There is no acceptance rule “{name}”; choose one of {known}, or a .toml file."
+            "There is no acceptance rule “{name}”; choose one of {known}, or a .toml file.",
+            name=name,
+            known=known,
         )
     return _read(path)
 
@@ -201,9 +203,11 @@ def _read(path: Path) -> Rule:
         criteria = tuple(_criterion(c) for c in data.pop("criteria"))
         return Rule(name=path.stem, criteria=criteria, **data)
     except KeyError as error:
-        raise SettingsError(f"The rule {path} lacks {error}.") from error
+        raise SettingsError("The rule {path} lacks {error}.", path=path, error=error) from error
     except (OSError, ValueError, TypeError, AttributeError) as error:
-        raise SettingsError(f"Cannot read the rule {path}: {error}.") from error
+        raise SettingsError(
+            "Cannot read the rule {path}: {error}.", path=path, error=error
+        ) from error
 
 
 def _criterion(data: Mapping[str, Any]) -> Criterion:

@@ -14,6 +14,7 @@ from pipecore.report.format import (
 from pipecore.report.summary import VERDICT_ORDER
 from pipecore.rules import outside_diameter
 from pipecore.types import Deformation, Element, Result, Review, ReviewState
+from pipegui.reasons import reason_text
 from pipegui.texts import format_measure, label_of, mark, tr
 
 REVIEW_ORDER = tuple(ReviewState)
@@ -56,7 +57,7 @@ class Column:
     def why_not(self, row: Row) -> str:
         """Why a cell holds no number."""
         default = tr("The scan does not carry this number: its arc is too short, or too noisy.")
-        return row.deformation.not_measurable.get(self.field, default)
+        return reason_text(row.deformation.not_measurable.get(self.field, default))
 
 
 def _number(

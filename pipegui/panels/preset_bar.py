@@ -16,7 +16,7 @@ from pipecore.settings import Settings
 from pipegui import theme
 from pipegui.panels.widgets import QuietComboBox
 from pipegui.presets import Preset, Presets
-from pipegui.texts import mark, tr
+from pipegui.texts import error_text, mark, tr
 
 NONE_OF_THEM = mark("Own settings")
 TOOL_TIP = Qt.ItemDataRole.ToolTipRole
@@ -114,7 +114,7 @@ class PresetBar(QWidget):
         try:
             self.chosen.emit(self._listed[row].load())
         except PipecoreError as error:
-            self.failed.emit(str(error))
+            self.failed.emit(error_text(error))
         self._list()
 
     def _open(self) -> None:
@@ -144,7 +144,7 @@ class PresetBar(QWidget):
         try:
             self._presets.save(self.name.text(), self._settings)
         except (PipecoreError, OSError) as error:
-            self.failed.emit(str(error))
+            self.failed.emit(error_text(error))
             return
         self._close()
         self._list()
@@ -156,7 +156,9 @@ class PresetBar(QWidget):
             self._presets.delete(preset)
         except OSError as error:
             self.failed.emit(
-                tr("“{name}” was not deleted: {error}").format(name=preset.name, error=error)
+                tr("“{name}” was not deleted: {error}").format(
+                    name=preset.name, error=error_text(error)
+                )
             )
         self._list()
 

@@ -8,6 +8,7 @@ from pipecore.geometry import Array
 from pipecore.report.format import format_clock
 from pipecore.types import Profiles
 from pipegui.plots.exaggeration import deviations
+from pipegui.reasons import reason_text
 from pipegui.section_cut import Ellipse, SectionCut
 from pipegui.texts import format_measure, mark, tr
 
@@ -127,5 +128,5 @@ def dimensions_text(profile: Profiles, cut: SectionCut) -> str:
             tr("ovality {ovality}").format(ovality=format_measure(100 * ovality, unit="%"))
         )
     if cut.curve is None:
-        parts.append(tr("no fitted curve: {no_curve}").format(no_curve=cut.no_curve))
+        parts.append(tr("no fitted curve: {no_curve}").format(no_curve=reason_text(cut.no_curve)))
     return " · ".join(parts)

@@ -11,7 +11,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QStandardPaths
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from pipegui import theme
+from pipegui import texts, theme
 from pipegui.document import Document, Scan
 from pipegui.jobs import Jobs
 from pipegui.main_window import MainWindow
@@ -75,6 +75,14 @@ def colours_of_the_system(qapp: QApplication) -> Iterator[None]:
     yield
     theme.choose(theme.Appearance.SYSTEM)
     theme.apply_theme(qapp)
+
+
+@pytest.fixture
+def german() -> Iterator[None]:
+    """The window speaks German."""
+    texts.use_language("de")
+    yield
+    texts.use_language("en")
 
 
 @pytest.fixture

@@ -26,13 +26,6 @@ from tests.factories import make_scan
 TRANSLATED = [code for code in texts.LANGUAGES if code not in ("", "en")]
 
 
-@pytest.fixture
-def german():
-    texts.use_language("de")
-    yield
-    texts.use_language("en")
-
-
 def forms(message):
     """Pairs of an English form and its translation."""
     ids, strings = message.id, message.string

@@ -1,6 +1,6 @@
 """Changes that need no point of the cloud: deleting, naming, sizing."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Any
 
@@ -33,7 +33,7 @@ def delete_elements(result: Result, element_ids: Collection[int]) -> Result:
     """
     gone = [find(result, i) for i in sorted(set(element_ids))]
     rest = without(result, {e.element_id for e in gone})
-    return noted(rest, "deleted " + listed(gone))
+    return noted(rest, f"deleted {Labels(gone)}")
 
 
 def name_element(result: Result, element_id: int, name: str) -> Result:
@@ -53,7 +53,7 @@ def name_run(result: Result, run_id: int, name: str) -> Result:
         If there is no such run.
     """
     if run_id not in {e.run_id for e in result.elements}:
-        raise EditError(f"There is no run {run_id}.")
+        raise EditError("There is no run {run_id}.", run_id=run_id)
     name = " ".join(name.split())
     others = {i: other for i, other in result.run_names.items() if i != run_id}
     names = others | ({run_id: name} if name else {})
@@ -102,13 +102,22 @@ def find(result: Result, element_id: int) -> Element:
     try:
         return result.element(element_id)
     except KeyError as error:
-        raise EditError(f"There is no element {element_id}.") from error
+        raise EditError("There is no element {element_id}.", element_id=element_id) from error
 
 
-def listed(elements: Iterable[Element]) -> str:
-    """Name elements in a sentence."""
-    *others, last = [e.label for e in elements]
-    return f"{', '.join(others)} and {last}" if others else last
+class Labels(tuple[Element, ...]):
+    """Elements that are named in a sentence."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        """Return "Pipe 1, Pipe 2 and Bend 3"."""
+        *others, last = [e.label for e in self]
+        return f"{', '.join(others)} and {last}" if others else last
+
+    def __format__(self, spec: str) -> str:
+        """Return the same within a sentence."""
+        return str(self)
 
 
 def noted(result: Result, what: str) -> Result:

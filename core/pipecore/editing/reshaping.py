@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipecore.catalogues import nominal_size
-from pipecore.editing.changes import find, kinds_of, listed, noted, on_elements
+from pipecore.editing.changes import Labels, find, kinds_of, noted, on_elements
 from pipecore.editing.measuring import Shape, fit_shape, measure_anew, part_of
 from pipecore.elements.extent import SHOWN_GAP
 from pipecore.errors import EditError
@@ -79,7 +79,7 @@ def merge_elements(
     name = next(filter(None, names), "")
     run_names = {**result.run_names, first.run_id: name} if name else result.run_names
     joined = replace(changed, elements=tuple(elements), run_names=run_names)
-    return noted(joined, f"merged {listed(parts)}")
+    return noted(joined, f"merged {Labels(parts)}")
 
 
 def split_element(
@@ -104,8 +104,12 @@ def split_element(
     length, least = whole.axis.length, MIN_PART * whole.radius
     if not least <= chainage <= length - least:
         raise EditError(
-            f"{whole.label} is {length:.3f} m long: "
-            f"split it between {least:.3f} and {length - least:.3f} m."
+            "{element.label} is {length:.3f} m long: "
+            "split it between {least:.3f} and {most:.3f} m.",
+            element=whole,
+            length=length,
+            least=least,
+            most=length - least,
         )
     new_id = max(e.element_id for e in result.elements) + 1
     middle_radius = float(whole.radius_at(chainage))
@@ -150,7 +154,11 @@ def change_kind(
     """
     element = find(result, element_id)
     if kind not in kinds_of(element):
-        raise EditError(f"{element.label} cannot be a {kind}: its axis is of another shape.")
+        raise EditError(
+            "{element.label} cannot be a {kind}: its axis is of another shape.",
+            element=element,
+            kind=kind,
+        )
     changed = replace(element, kind=kind)
     if (kind is ElementKind.CONE) != (element.kind is ElementKind.CONE):
         if kind is not ElementKind.CONE:
@@ -176,7 +184,11 @@ def _shape_on(
     thinning = result.settings_of(min(owners)).thinning
     shape = fit_shape(element, part_of(cloud, index), thinning, progress)
     if not shape.is_fitted and must_fit:
-        raise EditError(f"The points do not carry {element.label} as a {element.kind}.")
+        raise EditError(
+            "The points do not carry {element.label} as a {kind}.",
+            element=element,
+            kind=element.kind,
+        )
     return shape
 
 
@@ -191,17 +203,23 @@ def _sized(element: Element, settings: ElementSettings) -> Element:
 def _check_alike(parts: Sequence[Element]) -> None:
     first = parts[0]
     for other in parts[1:]:
-        names = f"{first.label} and {other.label}"
+        names = Labels((first, other))
         if other.kind is not first.kind or type(other.axis) is not type(first.axis):
-            raise EditError(f"{names} are not of one kind; change the kind of one first.")
+            raise EditError(
+                "{names} are not of one kind; change the kind of one first.", names=names
+            )
         if first.kind not in MERGED:
-            raise EditError(f"{names} cannot be merged: only pipes, reducers and bends can.")
+            raise EditError(
+                "{names} cannot be merged: only pipes, reducers and bends can.", names=names
+            )
         slack = SAME_RADIUS * min(first.radius, other.radius)
         slack += 3 * float(np.nan_to_num(np.hypot(first.radius_sd, other.radius_sd)))
         if first.kind is not ElementKind.CONE and abs(first.radius - other.radius) > slack:
             raise EditError(
-                f"{names} are not of one size: their radii are {1000 * first.radius:.1f} and "
-                f"{1000 * other.radius:.1f} mm."
+                "{names} are not of one size: their radii are {radius:.1f} and {other:.1f} mm.",
+                names=names,
+                radius=1000 * first.radius,
+                other=1000 * other.radius,
             )
 
 
@@ -225,8 +243,11 @@ def _common_axis(parts: Sequence[Element]) -> LineAxis | ArcAxis:
         turn = abs(float(part.axis.tangent(0.0) @ axis.tangent(_span_on(axis, part)[0])))
         if off > MAX_OFFSET * part.radius or turn < MAX_TURN_COS:
             raise EditError(
-                f"{listed(parts)} do not lie on one {name}: {part.label} is "
-                f"{1000 * off:.0f} mm off it."
+                "{names} do not lie on one {shape}: {element.label} is {off:.0f} mm off it.",
+                names=Labels(parts),
+                shape=name,
+                element=part,
+                off=1000 * off,
             )
     return _cut(axis, float(chainage.min()), float(chainage.max()))
 

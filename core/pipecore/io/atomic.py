@@ -30,7 +30,7 @@ def write_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     place = _place(path)
     if place.is_dir():
-        raise WriteError(f"“{path}” is a folder; give a file name.")
+        raise WriteError("“{path}” is a folder; give a file name.", path=path)
     temporary = _beside(place)
     with _told_as_write_errors(path):
         try:
@@ -87,10 +87,12 @@ def _check_vacant(place: Path, overwrite: bool) -> bool:
     if not place.exists():
         return True
     if not place.is_dir():
-        raise WriteError(f"“{place}” is a file; give a folder.")
+        raise WriteError("“{place}” is a file; give a folder.", place=place)
     is_empty = next(place.iterdir(), None) is None
     if not is_empty and not overwrite:
-        raise WriteError(f"The folder “{place}” is not empty; give another or allow overwriting.")
+        raise WriteError(
+            "The folder “{place}” is not empty; give another or allow overwriting.", place=place
+        )
     return is_empty
 
 
@@ -150,11 +152,15 @@ def _told_as_write_errors(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except PermissionError as error:
-        raise WriteError(f"You have no permission to write “{path}”.") from error
+        raise WriteError("You have no permission to write “{path}”.", path=path) from error
     except OSError as error:
         folder = _place(path).parent
         if not folder.is_dir():
             raise WriteError(
-                f"“{path}” cannot be written: there is no folder “{folder}”."
+                "“{path}” cannot be written: there is no folder “{folder}”.",
+                path=path,
+                folder=folder,
             ) from error
-        raise WriteError(f"“{path}” cannot be written ({error.strerror or error}).") from error
+        raise WriteError(
+            "“{path}” cannot be written ({reason}).", path=path, reason=error.strerror or error
+        ) from error

@@ -93,7 +93,7 @@ def read(
                 done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
                 progress.update("reading", min(float(done), 1.0))
             if cloud.n_points == before:
-                raise ReadError(f"“{path.name}” holds no valid points.")
+                raise ReadError("“{name}” holds no valid points.", name=path.name)
     progress.update("reading", 1.0)
     return cloud.finish(files[0])
 

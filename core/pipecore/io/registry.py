@@ -97,7 +97,7 @@ def identify(path: Path) -> Format:
         if candidate.signature is not None and candidate.signature.match(head):
             return candidate
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        raise ReadError(f"“{path.name}” is UTF-16 text; save it as UTF-8 or plain text.")
+        raise ReadError("“{name}” is UTF-16 text; save it as UTF-8 or plain text.", name=path.name)
     by_ending = next((f for f in _FORMATS if path.suffix.lower() in f.endings), None)
     if b"\0" not in head and by_ending is not None and by_ending.module in ("text", "pcd"):
         return by_ending
@@ -105,29 +105,33 @@ def identify(path: Path) -> Format:
         return _TEXT
     if by_ending is not None:
         raise ReadError(
-            f"“{path.name}” is damaged or no {by_ending.name} file: it does not begin like one."
+            "“{name}” is damaged or no {format_name} file: it does not begin like one.",
+            name=path.name,
+            format_name=by_ending.name,
         )
     known = ", ".join(f.name for f in _FORMATS)
-    raise ReadError(f"“{path.name}” is in no known point cloud format ({known}).")
+    raise ReadError(
+        "“{name}” is in no known point cloud format ({known}).", name=path.name, known=known
+    )
 
 
 def _head(path: Path) -> bytes:
     try:
         if path.is_dir():
-            raise ReadError(f"“{path}” is a folder; give a point cloud file.")
+            raise ReadError("“{path}” is a folder; give a point cloud file.", path=path)
         if path.exists() and not path.is_file():
-            raise ReadError(f"“{path}” is not an ordinary file.")
+            raise ReadError("“{path}” is not an ordinary file.", path=path)
         with path.open("rb") as file:
             head = file.read(HEAD_BYTES)
     except FileNotFoundError as error:
-        raise ReadError(f"There is no file “{path}”.") from error
+        raise ReadError("There is no file “{path}”.", path=path) from error
     except PermissionError as error:
-        raise ReadError(f"You have no permission to read “{path}”.") from error
+        raise ReadError("You have no permission to read “{path}”.", path=path) from error
     except (OSError, ValueError) as error:
         cause = getattr(error, "strerror", None) or "not a valid file name"
-        raise ReadError(f"“{path}” cannot be opened ({cause}).") from error
+        raise ReadError("“{path}” cannot be opened ({reason}).", path=path, reason=cause) from error
     if not head:
-        raise ReadError(f"“{path.name}” is empty.")
+        raise ReadError("“{name}” is empty.", name=path.name)
     return head
 
 

@@ -71,7 +71,9 @@ class Source:
     stations: Array = field(default_factory=lambda: np.empty((0, 3)))
 
 
-_CAUSES = {
+NO_SENSE = "its contents make no sense"
+IO_ERROR = "input/output error"
+CAUSES = {
     "ErrorBadChecksum": "its checksum does not match its contents",
     "ErrorBadFileLength": "it is not as long as it should be",
     "failed to fill whole buffer": "it is truncated",
@@ -87,14 +89,16 @@ def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
     except (PipecoreError, GeneratorExit):
         raise
     except MemoryError as error:
-        raise ReadError(f"“{path.name}” does not fit into memory.") from error
+        raise ReadError("“{name}” does not fit into memory.", name=path.name) from error
     except OSError as error:
         raise ReadError(
-            f"“{path.name}” cannot be read ({error.strerror or 'input/output error'})."
+            "“{name}” cannot be read ({reason}).",
+            name=path.name,
+            reason=error.strerror or IO_ERROR,
         ) from error
     except Exception as error:
         text = str(error)
-        causes = [cause for mark, cause in _CAUSES.items() if mark in text]
+        causes = [cause for mark, cause in CAUSES.items() if mark in text]
         raise damaged(path, format_name, *causes[:1]) from error
     except BaseException as error:
         # The Rust decoder of LAZ reports its own defects by an exception outside Exception.
@@ -103,13 +107,21 @@ def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
         raise damaged(path, format_name) from error
 
 
-def damaged(path: Path, format_name: str, cause: str = "its contents make no sense") -> ReadError:
+def damaged(path: Path, format_name: str, cause: str = NO_SENSE) -> ReadError:
     """Return the error of a file that is not what its format asks for."""
-    return ReadError(f"“{path.name}” is damaged or no whole {format_name} file: {cause}.")
+    return ReadError(
+        "“{name}” is damaged or no whole {format_name} file: {cause}.",
+        name=path.name,
+        format_name=format_name,
+        cause=cause,
+    )
 
 
 def truncated(path: Path, announced: int, held: int) -> ReadError:
     """Return the error of a file that ends too early or lies about its number of points."""
     return ReadError(
-        f"“{path.name}” is truncated: it announces {announced:,} points but holds {held:,}."
+        "“{name}” is truncated: it announces {announced:,} points but holds {held:,}.",
+        name=path.name,
+        announced=announced,
+        held=held,
     )

@@ -71,7 +71,7 @@ def info(path: str | os.PathLike[str], *, progress: Progress | None = None) -> F
     with file_format.open(path) as source:
         n_points, bounds, sample = _survey(source, progress)
         if not len(sample):
-            raise ReadError(f"“{path.name}” holds no valid points.")
+            raise ReadError("“{name}” holds no valid points.", name=path.name)
         return FileInfo(
             path,
             file_format.name,

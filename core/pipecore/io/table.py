@@ -164,8 +164,11 @@ class Table:
                     is_number(values[c]) for c in self.columns
                 ):
                     raise ReadError(
-                        f"“{self.path.name}”: line {n_lines_before + i + 1} is no point with "
-                        f"{self.n_columns} values: “{_shortened(line)}”."
+                        "“{name}”: line {number} is no point with {n_columns} values: “{line}”.",
+                        name=self.path.name,
+                        number=n_lines_before + i + 1,
+                        n_columns=self.n_columns,
+                        line=_shortened(line),
                     ) from None
                 rows.append([float(values[c]) for c in self.columns])
             return np.array(rows, dtype=np.float64).reshape(-1, len(self.columns))

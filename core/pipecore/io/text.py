@@ -92,7 +92,7 @@ def _find_layout(file: BinaryIO, path: Path) -> _Layout:
             first = i
             break
     if first is None:
-        raise ReadError(f"“{path.name}” holds no points.")
+        raise ReadError("“{name}” holds no points.", name=path.name)
 
     sample = [line for line in lines[first : first + SAMPLE_LINES] if not is_comment(line)]
     dialect = sniff_dialect(lines[first])
@@ -102,13 +102,17 @@ def _find_layout(file: BinaryIO, path: Path) -> _Layout:
         header, names = None, ()  # A remark that speaks of x, y and z.
     if header is not None and len(names) != len(values):
         raise ReadError(
-            f"“{path.name}”: the header names {len(names)} columns, "
-            f"line {first + 1} has {len(values)} values."
+            "“{name}”: the header names {n_names} columns, line {line} has {n_values} values.",
+            name=path.name,
+            n_names=len(names),
+            line=first + 1,
+            n_values=len(values),
         )
     if header is None and (len(values) < 3 or not all(map(is_number, values[:3]))):
         raise ReadError(
-            f"“{path.name}”: line {first + 1} is neither a point "
-            "nor a header that names x, y and z."
+            "“{name}”: line {line} is neither a point nor a header that names x, y and z.",
+            name=path.name,
+            line=first + 1,
         )
     columns = find_columns(names) if names else _guess_columns(sample, dialect, len(values))
     return _Layout(

@@ -95,7 +95,9 @@ def write_laz(
             world = cloud.world(cloud.xyz[rows].astype(np.float64)) / length_unit.metres
             steps = np.round((world - header.offsets) / step)
             if np.abs(steps).max() > np.iinfo(np.int32).max:
-                raise WriteError(f"“{path}” cannot be written: the cloud is too wide for LAS.")
+                raise WriteError(
+                    "“{path}” cannot be written: the cloud is too wide for LAS.", path=path
+                )
             for axis, name in enumerate("XYZ"):
                 points[name] = steps[:, axis].astype(np.int32)
             if cloud.intensity is not None:

@@ -44,7 +44,9 @@ def write_meshes(
     """
     ending = Path(path).suffix.lower()
     if ending not in (".ply", ".obj"):
-        raise WriteError(f"“{path}” cannot be written: meshes are written as .ply or .obj.")
+        raise WriteError(
+            "“{path}” cannot be written: meshes are written as .ply or .obj.", path=path
+        )
     with write_file(path) as temporary:
         if ending == ".ply":
             _write_ply(temporary, meshes, place)

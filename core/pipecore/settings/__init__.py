@@ -93,7 +93,7 @@ class Settings:
         specs = dict(iterate_fields())
         for key, value in changes.items():
             if key not in specs:
-                raise SettingsError(f"There is no setting “{key}”.")
+                raise SettingsError("There is no setting “{key}”.", key=key)
             group, name = key.split(".")
             grouped.setdefault(group, {})[name] = convert(key, value, specs[key])
         return dataclasses.replace(
@@ -124,7 +124,7 @@ class Settings:
         changes = {}
         for group, values in data.items():
             if not isinstance(values, Mapping):
-                raise SettingsError(f"“{group}” is not a group of settings.")
+                raise SettingsError("“{group}” is not a group of settings.", group=group)
             changes.update({f"{group}.{name}": value for name, value in values.items()})
         return cls().replace(changes)
 
@@ -144,11 +144,13 @@ class Settings:
         try:
             data = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-            raise SettingsError(f"Cannot read the settings file {path}: {error}.") from error
+            raise SettingsError(
+                "Cannot read the settings file {path}: {error}.", path=path, error=error
+            ) from error
         try:
             return cls.from_dict(data)
         except SettingsError as error:
-            raise SettingsError(f"{path}: {error}") from error
+            raise SettingsError("{path}: {error}", path=path, error=error) from error
 
 
 def iterate_fields() -> Iterator[tuple[str, FieldSpec]]:

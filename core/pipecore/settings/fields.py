@@ -89,13 +89,22 @@ def convert(key: str, value: Any, spec: FieldSpec) -> Any:
             return tuple(tuple(float(c) for c in vector) for vector in value)
     except (ValueError, TypeError):
         pass
-    raise SettingsError(f"“{value}” does not fit the setting “{key}”{_expected(spec)}.")
+    raise _misfit(key, value, spec)
 
 
-def _expected(spec: FieldSpec) -> str:
+def _misfit(key: str, value: object, spec: FieldSpec) -> SettingsError:
     if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
-        return " (one of: " + ", ".join(spec.kind) + ")"
-    return " (a number)" if spec.kind is float else ""
+        return SettingsError(
+            "“{value}” does not fit the setting “{key}” (one of: {choices}).",
+            value=value,
+            key=key,
+            choices=", ".join(spec.kind),
+        )
+    if spec.kind is float:
+        return SettingsError(
+            "“{value}” does not fit the setting “{key}” (a number).", value=value, key=key
+        )
+    return SettingsError("“{value}” does not fit the setting “{key}”.", value=value, key=key)
 
 
 def check(key: str, value: Any, spec: FieldSpec) -> None:
@@ -103,21 +112,30 @@ def check(key: str, value: Any, spec: FieldSpec) -> None:
     if spec.kind is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not math.isfinite(value):
-            raise SettingsError(f"The setting “{key}” must be a number, not {value!r}.")
+            raise SettingsError(
+                "The setting “{key}” must be a number, not {value!r}.", key=key, value=value
+            )
         if spec.minimum is not None and value < spec.minimum:
             raise SettingsError(
-                f"The setting “{key}” is {value:g}; it must be at least {spec.minimum:g}."
+                "The setting “{key}” is {value:g}; it must be at least {minimum:g}.",
+                key=key,
+                value=value,
+                minimum=spec.minimum,
             )
         if spec.maximum is not None and value > spec.maximum:
             raise SettingsError(
-                f"The setting “{key}” is {value:g}; it must be at most {spec.maximum:g}."
+                "The setting “{key}” is {value:g}; it must be at most {maximum:g}.",
+                key=key,
+                value=value,
+                maximum=spec.maximum,
             )
     elif key == "stacks.directions":
         for vector in value:
             usable = len(vector) in (3, 4) and all(map(math.isfinite, vector))
             if not usable or not any(vector[:3]) or vector[3:] < (0.0,) * len(vector[3:]):
                 raise SettingsError(
-                    f"The stack {list(vector)} is not a direction x, y, z with an optional width."
+                    "The stack {stack} is not a direction x, y, z with an optional width.",
+                    stack=list(vector),
                 )
     elif not isinstance(value, spec.kind):
-        raise SettingsError(f"{value!r} does not fit the setting “{key}”{_expected(spec)}.")
+        raise _misfit(key, value, spec)

@@ -48,8 +48,10 @@ class GridFrame:
         extent = cells_of(high, edge) - lowest + 5
         if max(np.prod(extent), np.abs(lowest).max()) > 2.0**62:
             raise PipecoreError(
-                f"The points span {extent.max() * edge:.3g} m, too far for cells of "
-                f"{edge * 1e3:.3g} mm; crop the cloud or thin it more."
+                "The points span {extent:.3g} m, too far for cells of {edge:.3g} mm; crop the "
+                "cloud or thin it more.",
+                extent=extent.max() * edge,
+                edge=edge * 1000.0,
             )
         return cls(lowest.astype(np.int64), edge, int(extent[1]), int(extent[2]))
 

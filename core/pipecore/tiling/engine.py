@@ -134,7 +134,8 @@ def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
             client = Client(scheduler, timeout=_CONNECT_TIMEOUT)
         except (OSError, TimeoutError, ValueError) as error:
             raise SettingsError(
-                f"No dask scheduler answers at “{scheduler}” (tiling.scheduler)."
+                "No dask scheduler answers at “{scheduler}” (tiling.scheduler).",
+                scheduler=scheduler,
             ) from error
         with client:
             yield Engine(client, store, _check_workers(client, scheduler, store))
@@ -149,19 +150,24 @@ def _check_workers(client: "Client", scheduler: str, store: Store) -> int:
     """Make sure that all workers can use the store; return the most threads on one computer."""
     workers = client.scheduler_info(n_workers=-1)["workers"]
     if not workers:
-        raise SettingsError(f"The dask scheduler at “{scheduler}” has no workers.")
+        raise SettingsError(
+            "The dask scheduler at “{scheduler}” has no workers.", scheduler=scheduler
+        )
     try:
         can_use = client.run(check_access, store)
     except CancelledError:
         raise
     except Exception as error:
         raise SettingsError(
-            f"The workers of “{scheduler}” cannot run pipecore; install the same version there."
+            "The workers of “{scheduler}” cannot run pipecore; install the same version there.",
+            scheduler=scheduler,
         ) from error
     if not all(can_use.values()):
         raise SettingsError(
-            f"The workers of “{scheduler}” cannot use “{store.folder.parent}”; choose a folder "
-            "that all of them share (tiling.folder)."
+            "The workers of “{scheduler}” cannot use “{parent}”; choose a folder that all "
+            "of them share (tiling.folder).",
+            scheduler=scheduler,
+            parent=store.folder.parent,
         )
     threads: dict[str, int] = {}
     for worker in workers.values():

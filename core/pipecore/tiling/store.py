@@ -131,7 +131,9 @@ def temporary_store(beside: Path | None) -> Iterator[Store]:
         folder.mkdir()
     except OSError as error:
         raise WriteError(
-            f"The folder for temporary files “{parent}” cannot be used ({error.strerror})."
+            "The folder for temporary files “{parent}” cannot be used ({reason}).",
+            parent=parent,
+            reason=error.strerror,
         ) from error
     store = Store(folder)
     try:
@@ -142,8 +144,10 @@ def temporary_store(beside: Path | None) -> Iterator[Store]:
             raise
         free = shutil.disk_usage(parent).free / 2**30
         raise WriteError(
-            f"The disk is full: in “{parent}”, where temporary files go, {free:.1f} GiB are "
-            "free; choose another folder (tiling.folder) or thin the cloud more."
+            "The disk is full: in “{parent}”, where temporary files go, {free:.1f} GiB are "
+            "free; choose another folder (tiling.folder) or thin the cloud more.",
+            parent=parent,
+            free=free,
         ) from error
     finally:
         store.give_up()
