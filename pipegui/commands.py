@@ -82,6 +82,8 @@ def activate_scan(document: Document, index: int) -> Document:
         tool=Tool.SELECT,
         measurements=(),
         measuring_from=None,
+        height_limits=None,
+        intensity_limits=None,
     )
     if document.scan is not None and view.colour_by not in colours_of(document.scan):
         view = replace(view, colour_by=colours_of(document.scan)[0])

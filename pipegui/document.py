@@ -46,6 +46,8 @@ class Tool(StrEnum):
 
 
 Point = tuple[float, float, float]
+Limits = tuple[float, float]
+"""The low and the high end of a range."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,10 @@ class ViewOptions:
     tool: Tool = Tool.SELECT
     measurements: tuple[Measurement, ...] = ()
     measuring_from: Point | None = None
+    height_limits: Limits | None = None
+    """Local heights at the ends of the colours, metres; None: what nearly all points keep to."""
+    intensity_limits: Limits | None = None
+    """The same for intensities."""
     """The first of two points, while the second is still to be picked."""
 
 

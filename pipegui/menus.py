@@ -154,10 +154,10 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _A(
             "fit_limits",
             "Fit limits",
-            "Deviation limits that hold 98 % of the points",
+            "Limits of the colours that hold nearly all points",
             "",
             "",
-            "result",
+            "scan",
         ),
         _SEPARATOR,
         _A(

@@ -5,8 +5,9 @@ from PySide6.QtWidgets import QLabel, QToolBar, QToolButton, QWidget
 
 from pipegui import theme
 from pipegui.actions import Actions
+from pipegui.colour_limits import n_decimals
 from pipegui.commands import colours_of
-from pipegui.document import ColourBy
+from pipegui.document import ColourBy, Limits
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
 from pipegui.texts import tr
 from pipegui.view_state import WindowState
@@ -17,6 +18,8 @@ class ToolBar(QToolBar):
 
     colour_chosen = Signal(object)
     limit_chosen = Signal(float)
+    limits_chosen = Signal(object)
+    """Low and high end of the colours, as `WindowState` tells them."""
 
     def __init__(self, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Tools", parent)
@@ -56,6 +59,20 @@ class ToolBar(QToolBar):
         self.addWidget(self.colour)
         self._limit_label = self.addWidget(QLabel(tr("Limits")))
         self._limit_action = self.addWidget(self.limit)
+        self.ends = [QuietSpinBox() for _ in range(2)]
+        self._end_actions = []
+        self._limits: Limits | None = None
+        for end, name in enumerate((tr("Lower limit"), tr("Upper limit"))):
+            field = self.ends[end]
+            field.setAccessibleName(name)
+            field.setToolTip(tr("Colours run from the lower to the upper limit"))
+            field.setRange(-1e9, 1e9)
+            field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
+            field.setFixedWidth(11 * theme.SPACING)
+            field.valueChanged.connect(lambda value, end=end: self._tell_end(end, value))
+            if self._end_actions:
+                self._end_actions.append(self.addWidget(QLabel("–")))
+            self._end_actions.append(self.addWidget(field))
         self.addSeparator()
         self.addWidget(QLabel(tr("Deformations")))
         for name in ("previous_deformation", "next_deformation"):
@@ -72,9 +89,30 @@ class ToolBar(QToolBar):
                     self.colour.addItem(tr(colour), colour)
             self.colour.setCurrentIndex(self.colour.findData(state.view.colour_by))
             self.limit.setValue(state.view.deviation_limit_mm)
+            self._show_ends(state)
         shows_deviation = state.scan is not None and state.view.colour_by is ColourBy.DEVIATION
-        for action in (self._limit_label, self._limit_action):
-            action.setVisible(shows_deviation)
+        self._limit_label.setVisible(shows_deviation or state.limits is not None)
+        self._limit_action.setVisible(shows_deviation)
+        for action in self._end_actions:
+            action.setVisible(state.limits is not None)
+
+    def _show_ends(self, state: WindowState) -> None:
+        self._limits = state.limits
+        if state.limits is None:
+            return
+        is_height = state.view.colour_by is ColourBy.HEIGHT
+        decimals = 2 if is_height else n_decimals(state.limits)
+        for field, value in zip(self.ends, state.limits, strict=True):
+            field.setDecimals(decimals)
+            field.setSingleStep(0.1 if is_height else 10.0 ** -max(decimals - 1, 0))
+            field.setSuffix(" m" if is_height else "")
+            field.setValue(value)
+
+    def _tell_end(self, end: int, value: float) -> None:
+        """Move one end; the other keeps what its field rounds."""
+        if not self._applying and self._limits is not None:
+            low, high = self._limits
+            self.limits_chosen.emit((low, value) if end else (value, high))
 
     def _tell_colour(self) -> None:
         if not self._applying:

@@ -9,7 +9,7 @@ from pipecore.geometry import Array, surface_points
 from pipecore.types import Element, PointCloud
 from pipegui import cuts
 from pipegui.commands import select_parent, select_point, set_view
-from pipegui.document import Box, Document, Measurement, Point, Tool
+from pipegui.document import Box, ColourBy, Document, Limits, Measurement, Point, Tool
 
 POINT_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)
 N_SAMPLED = 200_000
@@ -24,8 +24,25 @@ def set_point_size(document: Document, size: str) -> Document:
     return set_view(document, point_size=POINT_SIZES[min(max(now + step, 0), len(POINT_SIZES) - 1)])
 
 
+def set_limits(document: Document, limits: Limits) -> Document:
+    """Choose the ends of the colours: heights in the world's metres, or intensities."""
+    low, high = min(limits), max(limits)
+    if document.scan is None or low == high:
+        return document
+    if document.view.colour_by is ColourBy.HEIGHT:
+        base = float(document.scan.cloud.origin[2])
+        return set_view(document, height_limits=(low - base, high - base))
+    if document.view.colour_by is ColourBy.INTENSITY:
+        return set_view(document, intensity_limits=(low, high))
+    return document
+
+
 def fit_limits(document: Document) -> Document:
-    """Choose deviation limits that hold 98 % of the points, in whole steps of 0.5 mm."""
+    """Choose limits that hold nearly all points; of deviations 98 %, in steps of 0.5 mm."""
+    if document.view.colour_by is ColourBy.HEIGHT:
+        return set_view(document, height_limits=None)
+    if document.view.colour_by is ColourBy.INTENSITY:
+        return set_view(document, intensity_limits=None)
     if document.result is None:
         return document
     deviation = document.result.deviation

@@ -26,11 +26,12 @@ from pipecore.types import (
     Review,
     Stack,
 )
-from pipegui import cuts, selecting
+from pipegui import colour_limits, cuts, selecting
 from pipegui.document import (
     Box,
     ColourBy,
     Document,
+    Limits,
     Measurement,
     ProfileKey,
     Scan,
@@ -245,6 +246,8 @@ class WindowState:
     scan: Scan | None = None
     view: ViewOptions = ViewOptions()
     has_selection: bool = False
+    limits: Limits | None = None
+    """Ends of the colours of heights (world) or intensities, where these are shown."""
 
 
 @dataclass(frozen=True)
@@ -279,7 +282,12 @@ def resolve(document: Document) -> ViewState:
                 profile_xyz = cuts.points_of_profile(*args)
         shown = selecting.shown_profile(result, selection)
     return ViewState(
-        window=WindowState(scan, view, selection != Selection()),
+        window=WindowState(
+            scan,
+            view,
+            selection != Selection(),
+            colour_limits.shown_limits(scan.cloud, view) if scan else None,
+        ),
         scene=SceneState(
             scan_key=str(id(scan.cloud)) if scan else "",
             cloud=scan.cloud if scan else None,

@@ -137,6 +137,7 @@ def connect_panels(window: "MainWindow") -> None:
     panels.stacks.points_taken.connect(lambda: _take_points(window))
     bar = window.tool_bar
     bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
+    bar.limits_chosen.connect(lambda limits: do(view_commands.set_limits, limits))
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
+from pipegui.colour_limits import height_limits, intensity_limits
 from pipegui.colour_maps import (
     BLOCK,
     HEIGHT,
@@ -122,25 +123,6 @@ def _share(values: NDArray[np.floating], limits: tuple[float, float]) -> NDArray
     return (values - low) / max(high - low, 1e-12)
 
 
-# Ranges and colourings are of a whole cloud; kept while it is looked at.
-
-
-@lru_cache(maxsize=4)
-def intensity_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the intensities between which nearly all points lie."""
-    sample = cloud.intensity[:: max(1, len(cloud) // 100_000)]
-    low, high = np.nanpercentile(sample, [2, 98])
-    return float(low), float(high)
-
-
-@lru_cache(maxsize=4)
-def height_range(cloud: PointCloud) -> tuple[float, float]:
-    """Return the local heights between which nearly all points lie."""
-    sample = cloud.xyz[:: max(1, len(cloud) // 100_000), 2]
-    low, high = np.percentile(sample, [0.5, 99.5])
-    return float(low), float(high)
-
-
 @lru_cache(maxsize=4)
 def _apart(cloud: PointCloud, result: Result, colour_by: ColourBy) -> NDArray[np.intp]:
     """Index into `QUALITATIVE` for each id."""
@@ -165,12 +147,12 @@ def _by_rgb(asked: _Asked) -> Colours:
 
 
 def _by_intensity(asked: _Asked) -> Colours:
-    share = _share(asked.cloud.intensity[asked.rows], intensity_range(asked.cloud))
+    share = _share(asked.cloud.intensity[asked.rows], intensity_limits(asked.cloud, asked.view))
     return look_up(INTENSITY, share, asked.muted)
 
 
 def _by_height(asked: _Asked) -> Colours:
-    share = _share(asked.cloud.xyz[asked.rows, 2], height_range(asked.cloud))
+    share = _share(asked.cloud.xyz[asked.rows, 2], height_limits(asked.cloud, asked.view))
     return look_up(HEIGHT, share, asked.muted)
 
 

@@ -18,7 +18,14 @@ from pipegui.scene.projection import Projection
 from pipegui.scene.spreading import Spread
 from pipegui.view_state import SceneState
 
-COLOURING = ("colour_by", "deviation_limit_mm", "shown_stack", "shown_profile")
+COLOURING = (
+    "colour_by",
+    "deviation_limit_mm",
+    "height_limits",
+    "intensity_limits",
+    "shown_stack",
+    "shown_profile",
+)
 NO_LIMIT = 2**31
 AT_ONCE = 400_000
 """Of more points than these, the window does not wait to know which are to be seen: so many,

@@ -6,16 +6,16 @@ import numpy as np
 
 from pipecore.report.format import MINUS
 from pipecore.types import ElementKind, PointCloud, Result
+from pipegui.colour_limits import height_limits, intensity_limits, n_decimals
 from pipegui.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours, rgb
 from pipegui.colours import VERDICT
-from pipegui.document import ColourBy, ViewOptions
+from pipegui.document import ColourBy, Limits, ViewOptions
 from pipegui.scene.colouring import (
     KIND_COLOUR,
     NO_ELEMENT,
     PROFILE_COLOURS,
     SOUND,
     effective,
-    height_range,
     stack_of,
 )
 from pipegui.texts import first_capital, mark, tr
@@ -59,11 +59,10 @@ def make_legend(cloud: PointCloud, result: Result | None, view: ViewOptions) -> 
     if colour_by is ColourBy.DEVIATION:
         return Legend(tr("Deviation, mm"), DEVIATION, _deviation_ticks(view.deviation_limit_mm))
     if colour_by is ColourBy.HEIGHT:
-        low, high = (h + float(cloud.origin[2]) for h in height_range(cloud))
-        ticks = tuple((s, f"{low + s * (high - low):.2f}") for s in (0.0, 0.5, 1.0))
-        return Legend(tr("Height, m"), HEIGHT, ticks)
+        low, high = (h + float(cloud.origin[2]) for h in height_limits(cloud, view))
+        return Legend(tr("Height, m"), HEIGHT, _ticks((low, high)))
     if colour_by is ColourBy.INTENSITY:
-        return Legend(tr("Intensity"), INTENSITY, ((0.0, tr("low")), (1.0, tr("high"))))
+        return Legend(tr("Intensity"), INTENSITY, _ticks(intensity_limits(cloud, view)))
     return _result_legend(colour_by, result, view) if result is not None else None
 
 
@@ -76,6 +75,14 @@ def _result_legend(colour_by: ColourBy, result: Result, view: ViewOptions) -> Le
     if colour_by is ColourBy.PROFILE:
         return _profile_legend(result, view)
     return None
+
+
+def _ticks(limits: Limits) -> tuple[tuple[float, str], ...]:
+    low, high = limits
+    decimals = n_decimals(limits)
+    shares = np.linspace(0, 1, 5).tolist()
+    values = (f"{low + share * (high - low):.{decimals}f}" for share in shares)
+    return tuple((s, v.replace("-", MINUS)) for s, v in zip(shares, values, strict=True))
 
 
 def _deviation_ticks(limit_mm: float) -> tuple[tuple[float, str], ...]:

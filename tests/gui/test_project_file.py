@@ -128,6 +128,8 @@ plain_views = st.builds(
     st.booleans(),
     clip_box=st.none()
     | st.builds(Box, st.tuples(*[finite] * 3), st.tuples(*[finite] * 3), st.booleans()),
+    height_limits=st.none() | st.tuples(finite, finite),
+    intensity_limits=st.none() | st.tuples(finite, finite),
 )
 
 

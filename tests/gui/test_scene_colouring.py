@@ -3,9 +3,20 @@
 import numpy as np
 import pytest
 
-from pipegui.colour_maps import DEVIATION, KINDS, QUALITATIVE, deviation_colours, rgb
+from pipecore.report.format import MINUS
+from pipegui import commands, view_commands
+from pipegui.colour_limits import shown_limits
+from pipegui.colour_maps import (
+    DEVIATION,
+    HEIGHT,
+    INTENSITY,
+    KINDS,
+    QUALITATIVE,
+    deviation_colours,
+    rgb,
+)
 from pipegui.colours import VERDICT
-from pipegui.document import Box, ColourBy, ViewOptions
+from pipegui.document import Box, ColourBy, Document, Scan, ViewOptions
 from pipegui.scene.colouring import (
     MUTED,
     SOUND,
@@ -127,6 +138,39 @@ def test_that_the_height_legend_is_in_world_coordinates():
     low, high = float(legend.ticks[0][1]), float(legend.ticks[-1][1])
     world = CLOUD.world(CLOUD.xyz)[:, 2]
     assert world.min() - 0.01 <= low < high <= world.max() + 0.01
+
+
+@pytest.mark.parametrize("colour_by", [ColourBy.HEIGHT, ColourBy.INTENSITY])
+def test_that_beyond_chosen_limits_colours_stay_those_of_the_ends(colour_by):
+    values = CLOUD.xyz[:, 2] if colour_by is ColourBy.HEIGHT else CLOUD.intensity
+    low, high = (float(v) for v in np.quantile(values, [0.3, 0.6]))
+    name = f"{colour_by.name.lower()}_limits"
+    view = ViewOptions(colour_by=colour_by, **{name: (low, high)})
+    colours = colour_points(CLOUD, RESULT, view)
+    table = {ColourBy.HEIGHT: HEIGHT, ColourBy.INTENSITY: INTENSITY}[colour_by]
+    assert (colours[values <= low] == table[0]).all()
+    assert (colours[values >= high] == table[-1]).all()
+    between = np.unique(colours[(values > low) & (values < high)], axis=0)
+    assert len(between) > 20
+    # The legend says so, in the world's heights.
+    ticks = make_legend(CLOUD, RESULT, view).ticks
+    base = float(CLOUD.origin[2]) if colour_by is ColourBy.HEIGHT else 0.0
+    shown = [float(ticks[i][1].replace(MINUS, "-")) for i in (0, -1)]
+    assert shown == pytest.approx([low + base, high + base], abs=0.01 * (high - low))
+
+
+def test_that_chosen_limits_are_kept_and_fitted_ones_follow_the_points():
+    document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),))
+    document = view_commands.set_view(document, colour_by=ColourBy.HEIGHT)
+    base = float(CLOUD.origin[2])
+    chosen = view_commands.set_limits(document, (base + 2.0, base + 1.0))
+    assert chosen.view.height_limits == pytest.approx((1.0, 2.0))
+    assert shown_limits(CLOUD, chosen.view) == pytest.approx((base + 1.0, base + 2.0))
+    assert view_commands.set_limits(chosen, (base, base)) is chosen
+    assert view_commands.fit_limits(chosen).view.height_limits is None
+    # Another scan has other heights.
+    other = commands.open_scan(chosen, Scan("other.laz", CLOUD))
+    assert other.view.height_limits is None
 
 
 def test_that_the_kind_legend_lists_the_kinds_that_are_there():

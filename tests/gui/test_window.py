@@ -14,6 +14,7 @@ from pipecore.types import NO_ID
 from pipegui.document import Background, ColourBy, ProfileKey, Selection, Tool
 from pipegui.menus import SPECS
 from pipegui.panels.deformation_columns import INDEX
+from pipegui.view_state import resolve
 from tests.factories import make_cloud, make_result
 
 LEFT = Qt.MouseButton.LeftButton
@@ -245,6 +246,29 @@ def test_that_the_view_is_changed_by_menus_and_keys(detected, qtbot):
     assert chosen == [Background.BLACK]
     detected.actions_["eye_dome"].trigger()
     assert view.state.view.eye_dome
+
+
+@pytest.mark.parametrize("colour_by", [ColourBy.HEIGHT, ColourBy.INTENSITY])
+def test_that_limits_of_heights_and_intensities_are_typed(detected, qtbot, colour_by):
+    bar = detected.tool_bar
+    bar.colour.setCurrentIndex(bar.colour.findData(colour_by))
+    low, high = bar.ends
+    qtbot.waitUntil(lambda: low.isVisible() and high.isVisible() and not bar.limit.isVisible())
+    name = f"{colour_by.name.lower()}_limits"
+    assert getattr(detected.document.view, name) is None
+    before = resolve(detected.document).window.limits
+    wanted = round(sum(before) / 2, 2)
+    high.setFocus()
+    high.selectAll()
+    qtbot.keyClicks(high, f"{wanted:.2f}")
+    qtbot.keyClick(high, Qt.Key.Key_Return)
+    base = detected.document.scan.cloud.origin[2] if colour_by is ColourBy.HEIGHT else 0.0
+    chosen = getattr(detected.parts.scene.state.view, name)
+    # The other end keeps what its field rounds.
+    assert [c + base for c in chosen] == pytest.approx([before[0], wanted], abs=1e-3)
+    detected.actions_["fit_limits"].trigger()
+    assert getattr(detected.document.view, name) is None
+    assert resolve(detected.document).window.limits == before
 
 
 def test_that_limits_are_fitted_to_the_deviations(detected):
