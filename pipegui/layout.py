@@ -156,5 +156,6 @@ def _set_default_sizes(window: "MainWindow") -> None:
     halves = [height * 55 // 100, height * 45 // 100]
     window.resizeDocks([docks["Project"], docks["Stacks"]], halves, down)
     # Plots need the height more than a list does.
-    plots = [height * 65 // 100, height * 35 // 100]
+    share = 65 if height > 900 else 75
+    plots = [height * share // 100, height * (100 - share) // 100]
     window.resizeDocks([docks["Element"], docks["Properties"]], plots, down)

@@ -34,8 +34,8 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
         "load_settings": menu.load_settings,
         "save_settings": menu.save_settings,
         "quit": window.close,
-        "undo": window.history.undo,
-        "redo": window.history.redo,
+        "undo": lambda: _step_history(window, window.history.undo),
+        "redo": lambda: _step_history(window, window.history.redo),
         "go_up": lambda: do(view_commands.escape),
         "clip": lambda _: do(view_commands.switch_clip),
         "clip_to_selection": lambda: do(view_commands.clip_to_selection),
@@ -139,6 +139,12 @@ def connect_panels(window: "MainWindow") -> None:
     bar.colour_chosen.connect(lambda colour: do(commands.set_colour, colour))
     bar.limits_chosen.connect(lambda limits: do(view_commands.set_limits, limits))
     bar.limit_chosen.connect(lambda mm: do(commands.set_view, deviation_limit_mm=mm))
+
+
+def _step_history(window: "MainWindow", step: Callable[[], object]) -> None:
+    """Go a step back or ahead; what was said of another step is not so any more."""
+    window.panels.message.hide()
+    step()
 
 
 def _click(window: "MainWindow", point_index: int) -> None:

@@ -70,6 +70,15 @@ def key_of(sign: str, colour: QColor, text: str) -> str:
     return f"{coloured}&nbsp;{text.replace(' ', '&nbsp;')}" if text else coloured
 
 
+def row_text(profiles: Profiles, row: int) -> str:
+    """What is said of the profile under the cursor."""
+    radius = format_measure(1000 * profiles.radius[row], 1000 * profiles.radius_sd[row], "mm")
+    centre = format_measure(1000 * profiles.centre_deviation[row], unit="mm")
+    index, chainage = profiles.profile_index[row], profiles.chainage[row]
+    text = tr("Profile {index} · {chainage:.3f} m · radius {radius} · centre off {centre}")
+    return text.format(index=index, chainage=chainage, radius=radius, centre=centre)
+
+
 def legend(
     curve: Curve,
     pinned: Sequence[Curve],

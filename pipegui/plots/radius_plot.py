@@ -25,13 +25,15 @@ from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, small
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import index_at, pattern_of
-from pipegui.plots.radius_curves import Curve, legend, range_of, table_of
+from pipegui.plots.radius_curves import Curve, legend, range_of, row_text, table_of
 from pipegui.plots.series_menu import SeriesMenu
 from pipegui.texts import format_measure, label_of, mark, tr
 from pipegui.view_state import RadiusPlotState
 
 EMPTY = mark("Select an element to see its radius from profile to profile.")
 CLICK_PX = 20
+ROOM_FOR_ALL = 260
+"""Height in pixels below which the radius stands alone."""
 SPACE = 4
 """Pixels between the plots."""
 NO_PROFILES = mark("{label} has no profiles with an accepted ellipse.")
@@ -69,6 +71,7 @@ class RadiusPlot(Chart):
         self._state = RadiusPlotState()
         self._curve: Curve | None = None
         self._pinned: list[Curve] = []
+        self._had_room = True
         self._make_header()
         self.radius = self.add_plot(0, "mm")
         self.offset = self.add_plot(1, "mm")
@@ -82,6 +85,7 @@ class RadiusPlot(Chart):
         ]
         for plot in (self.offset, self.ovality):
             plot.setXLink(self.radius)
+        self.canvas.sigDeviceRangeChanged.connect(self._follow_room)
         self.on_click(self._click)
         self.on_hover(self._hover)
         self.setAccessibleName(tr("Radius plot"))
@@ -231,15 +235,24 @@ class RadiusPlot(Chart):
         self._mark_selected(curve)
         self._describe(curve)
 
+    def _has_room(self) -> bool:
+        return bool(self.canvas.height() >= ROOM_FOR_ALL)
+
+    def _follow_room(self) -> None:
+        """Leave the smaller plots out of a small panel."""
+        if self._curve is not None and self._had_room != self._has_room():
+            self._arrange()
+
     def _arrange(self) -> None:
         """Show the plots that are wanted; the lowest has the axis's numbers and name."""
         assert self._curve is not None
+        self._had_room = self._has_room()
         every = (self._curve, *self._pinned)
         has_ovality = any(np.isfinite(c.profiles.ovality).any() for c in every)
         wanted = {
             self.radius: True,
-            self.offset: self.shows("centre"),
-            self.ovality: self.shows("ovality") and has_ovality,
+            self.offset: self.shows("centre") and self._has_room(),
+            self.ovality: self.shows("ovality") and has_ovality and self._has_room(),
         }
         layout = self.canvas.ci.layout
         for row, (plot, is_wanted) in enumerate(wanted.items()):
@@ -374,19 +387,11 @@ class RadiusPlot(Chart):
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
         row = self._row_at(plot, position) if plot is not None else None
-        self.readout.setText("" if row is None else self._row_text(row))
+        text = "" if row is None else row_text(self._state.shown, row)
+        metrics, elide = QFontMetrics(self.readout.font()), Qt.TextElideMode.ElideRight
+        self.readout.setText(metrics.elidedText(text, elide, self.readout.width()))
         self.profile_hovered.emit(None if row is None else self._key_of(row))
 
     def _key_of(self, row: int) -> ProfileKey:
         profiles = self._state.shown
         return ProfileKey(int(profiles.stack_id[row]), int(profiles.profile_index[row]))
-
-    def _row_text(self, row: int) -> str:
-        profiles = self._state.shown
-        radius = format_measure(1000 * profiles.radius[row], 1000 * profiles.radius_sd[row], "mm")
-        centre = format_measure(1000 * profiles.centre_deviation[row], unit="mm")
-        index, chainage = profiles.profile_index[row], profiles.chainage[row]
-        text = tr("Profile {index} · {chainage:.3f} m · radius {radius} · centre off {centre}")
-        text = text.format(index=index, chainage=chainage, radius=radius, centre=centre)
-        metrics = QFontMetrics(self.readout.font())
-        return metrics.elidedText(text, Qt.TextElideMode.ElideRight, self.readout.width())

@@ -2,7 +2,7 @@
 
 import gc
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import pytest
@@ -48,9 +48,35 @@ def _render_windows() -> set[int]:
     return {id(o) for o in gc.get_objects() if isinstance(o, core.vtkRenderWindow)}
 
 
+HAS_FAILED = pytest.StashKey[bool]()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    report = yield
+    item.stash[HAS_FAILED] = item.stash.get(HAS_FAILED, False) or report.failed
+    return report
+
+
+def _clear_away(app: QApplication, windows: Collection[int]) -> None:
+    """Close and delete what a test left open: the next one needs the keyboard for itself."""
+    while (popup := app.activePopupWidget()) is not None:
+        popup.close()
+    for widget in app.topLevelWidgets():
+        if shiboken6.isValid(widget) and shiboken6.getCppPointer(widget)[0] not in windows:
+            if isinstance(widget, MainWindow):
+                widget.projects.discard()
+            widget.close()
+            widget.deleteLater()
+    _flush()
+
+
 @pytest.fixture(autouse=True)
 def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Fail a test that leaves a window, a running thread or a VTK render window behind."""
+    """Fail a test that leaves a window, a running thread or a VTK render window behind.
+
+    Of a test that failed already this is not asked: the report of its failure holds on to them.
+    """
     if "qtbot" not in request.fixturenames:
         yield
         return
@@ -64,17 +90,13 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
     left = [window for address, window in _top_level(app).items() if address not in windows]
     running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
     rendering = _render_windows() - render_windows
+    if left:
+        _clear_away(app, windows)
+    if request.node.stash.get(HAS_FAILED, False):
+        return
     assert not left, f"top-level widgets left behind: {left}"
     assert not running, f"threads left running: {running}"
     assert not rendering, f"{len(rendering)} VTK render windows left behind"
-
-
-@pytest.fixture
-def colours_of_the_system(qapp: QApplication) -> Iterator[None]:
-    """For tests that choose dark or light: the next one finds what all others find."""
-    yield
-    theme.choose(theme.Appearance.SYSTEM)
-    theme.apply_theme(qapp)
 
 
 @pytest.fixture

@@ -366,3 +366,14 @@ def test_that_a_spot_on_the_surface_and_its_point_are_one():
     assert off == pytest.approx(abs(RESULT.deviation[index]), abs=2e-3)
     assert cuts.spot_of_point(CLOUD, RESULT, 9, index) is None
     assert cuts.spot_of_point(CLOUD, RESULT, 2, -1) is None
+
+
+def test_that_in_a_small_panel_the_radius_has_all_the_room(radius, qtbot):
+    assert radius.offset.isVisible()
+    radius.resize(420, 300)
+    qtbot.waitUntil(lambda: not radius.offset.isVisible() and not radius.ovality.isVisible())
+    assert radius.radius.getAxis("bottom").labelText == "Profile index"
+    assert radius.radius.vb.height() > 40
+    radius.resize(420, 600)
+    qtbot.waitUntil(radius.offset.isVisible)
+    assert radius.radius.getAxis("bottom").labelText == ""

@@ -634,3 +634,11 @@ def test_that_the_cursor_on_the_map_is_marked_in_3d_and_the_other_way_round(dete
     assert parts.map.cursor is not None
     parts.scene.hovered.emit(int(np.flatnonzero(scan.result.element_id == 9)[0]))
     assert parts.map.cursor is None
+
+
+def test_that_what_was_said_of_a_step_goes_when_it_is_undone(detected, qtbot):
+    message = detected.panels.message
+    assert message.isVisible()
+    qtbot.keyClick(detected, Qt.Key.Key_Z, CTRL)
+    assert detected.document.result is None
+    assert not message.isVisible()
