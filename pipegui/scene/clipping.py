@@ -99,7 +99,7 @@ class BoxFrame:
         self._layer = layer
         self._actor: vtkActor | None = None
 
-    def show(self, box: Box | None, colour: tuple[float, float, float]) -> None:
+    def show(self, box: Box | None, colour: tuple[float, float, float], width: float = 1.0) -> None:
         """Draw the edges of a box, or none."""
         if self._actor is not None:
             self._layer.RemoveActor(self._actor)
@@ -111,7 +111,7 @@ class BoxFrame:
         self._actor = vtkActor()
         self._actor.SetMapper(mapper)
         self._actor.GetProperty().SetColor(colour)
-        self._actor.GetProperty().SetLineWidth(1.5)
+        self._actor.GetProperty().SetLineWidth(width)
         self._actor.GetProperty().LightingOff()
         self._layer.AddActor(self._actor)
 

@@ -41,6 +41,7 @@ class Decorations:
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
         self._accented: dict[bool, vtkActor] = {}
         self._box: Box | None = None
+        self._scale = 1.0
         self.dark = False
         """Whether it is drawn on a dark background."""
 
@@ -67,11 +68,19 @@ class Decorations:
         if everything or state.profile is not before.profile:
             self._replace("profile", self._profile(state))
 
-    def prepare(self, *, moving: bool, point_px: float) -> None:
-        """Draw the points of the selection a little larger than the others, over them."""
+    def prepare(self, *, moving: bool, point_px: float, scale: float = 1.0) -> None:
+        """Draw the points of the selection a little larger than the others, over them.
+
+        Widths and sizes are of pixels of which the screen has `scale` each.
+        """
+        if scale != self._scale:
+            for group in self._groups.values():
+                for _, actor in group:
+                    _enlarge(actor, scale / self._scale)
+            self._scale = scale
         for is_for_moving, actor in self._accented.items():
             actor.SetVisibility(is_for_moving == moving)
-            actor.GetProperty().SetPointSize(point_px + 1)
+            actor.GetProperty().SetPointSize(scale * (point_px + 1))
 
     def clip(self, box: Box | None) -> None:
         """Draw only what lies in the box."""
@@ -97,6 +106,7 @@ class Decorations:
         self._groups[name] = [(self._layers[i], actor) for i, actor in actors]
         for layer, actor in self._groups[name]:
             layer.AddActor(actor)
+            _enlarge(actor, self._scale)
             set_planes(actor, self._box)
 
     def _axes(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
@@ -219,6 +229,13 @@ def _surface(mesh: pv.PolyData, colour: QColor) -> vtkActor:
 def _points(xyz: np.ndarray, colour: QColor) -> vtkActor:
     colours = np.broadcast_to(np.array(colour.getRgb()[:3], np.uint8), (len(xyz), 3)).copy()
     return point_actor(np.ascontiguousarray(xyz, np.float32), colours)
+
+
+def _enlarge(actor: vtkActor, ratio: float) -> None:
+    """Draw wider lines and larger points."""
+    drawn = actor.GetProperty()
+    drawn.SetLineWidth(ratio * drawn.GetLineWidth())
+    drawn.SetPointSize(ratio * drawn.GetPointSize())
 
 
 def _paint(actor: vtkActor, colour: QColor) -> None:

@@ -33,8 +33,8 @@ class Glimpse:
         """A few points of every part, shape (n, 3)."""
         return np.concatenate(self._samples)
 
-    def add(self, part: PointCloud) -> None:
-        """Show one more part."""
+    def add(self, part: PointCloud, scale: float = 1.0) -> None:
+        """Show one more part; `scale` pixels of the screen are one."""
         self._samples.append(part.xyz[:: max(1, len(part) // N_SAMPLED)].astype(np.float64))
         if self._n_points > MOST:
             return
@@ -42,7 +42,7 @@ class Glimpse:
         if colours is None:
             colours = np.full((len(part), 3), PLAIN, np.uint8)
         actor = point_actor(np.ascontiguousarray(part.xyz, np.float32), colours)
-        actor.GetProperty().SetPointSize(POINT_PX)
+        actor.GetProperty().SetPointSize(scale * POINT_PX)
         self._renderer.AddActor(actor)
         self._actors.append(actor)
         self._n_points += len(part)

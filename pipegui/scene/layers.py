@@ -118,6 +118,7 @@ class Layers(QObject):
                 pixel_size=projection.pixel_size(canvas.pose.distance),
                 visible=view.show_points and layer is self.shown,
                 size=view.point_size,
+                scale=canvas.devicePixelRatioF(),
             )
 
     def pick(self, position: QPointF, *, quick: bool = False) -> int:

@@ -129,11 +129,17 @@ class PointLayer:
             part.is_coloured = False
 
     def show(
-        self, *, seconds: float, pixel_size: float, visible: bool = True, size: float = 1.0
+        self,
+        *,
+        seconds: float,
+        pixel_size: float,
+        visible: bool = True,
+        size: float = 1.0,
+        scale: float = 1.0,
     ) -> None:
         """Show what can be drawn in so many seconds, 0 while the camera moves.
 
-        A pixel is `pixel_size` metres large at the focus.
+        A pixel is `pixel_size` metres large at the focus; the screen has `scale` for each.
         """
         limit = (seconds or MOVING_SECONDS) / self.seconds_per_point
         limit = min(max(limit, MOVING_LEVEL), self.most) if seconds else min(limit, MOVING_LEVEL)
@@ -148,7 +154,7 @@ class PointLayer:
             self.point_px = float(max(size * suiting, MIN_POINT_PX))
         for i, part in enumerate(self._slices):
             part.actor.SetVisibility(i < len(shown))
-            part.actor.GetProperty().SetPointSize(self.point_px)
+            part.actor.GetProperty().SetPointSize(scale * self.point_px)
         for part in shown:
             part.is_uploaded = True
 

@@ -47,6 +47,8 @@ HINTS = {
 """Before and after the first of two points."""
 IS_DARK = {Background.DARK, Background.BLACK}
 HOVER_MS = 60
+FRAME_PX = 1.5
+"""Width of the clip box's edges."""
 
 
 class SceneView(QWidget):
@@ -171,7 +173,7 @@ class SceneView(QWidget):
         """Show a part of a scan that is still being read, and all before it."""
         if self._background is None:
             self._set_background(_background(self._state.view))
-        self._glimpse.add(part)
+        self._glimpse.add(part, self.devicePixelRatioF())
         self.canvas.fly_to(self._framed(self.canvas.pose, self._glimpse.sample), fly=False)
 
     def end_glimpse(self) -> None:
@@ -247,14 +249,19 @@ class SceneView(QWidget):
     def _prepare_frame(self) -> None:
         canvas, projection = self.canvas, self.canvas.projection()
         self.layers.show(projection)
-        self._decorations.prepare(moving=canvas.is_moving, point_px=self.layers.shown.point_px)
+        self._decorations.prepare(
+            moving=canvas.is_moving,
+            point_px=self.layers.shown.point_px,
+            scale=canvas.devicePixelRatioF(),
+        )
         self.overlay.follow(projection, canvas.pose)
 
     # Clipping
 
     def _show_box(self, box: Box | None) -> None:
         tint = theme.colour("accent", dark=self._background in IS_DARK)
-        self._frame.show(box, (tint.redF(), tint.greenF(), tint.blueF()))
+        width = FRAME_PX * self.devicePixelRatioF()
+        self._frame.show(box, (tint.redF(), tint.greenF(), tint.blueF()), width)
         self._decorations.clip(box)
         self.overlay.handles = None if box is None else clipping.handles(box)
 
