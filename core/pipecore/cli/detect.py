@@ -56,17 +56,19 @@ def _detected(
     args: argparse.Namespace, settings: Settings, console: Console
 ) -> Iterator[tuple[PointCloud, Result]]:
     """Read and detect, in tiles if the scan is larger than the memory it may take."""
-    need = estimate_need(args.inputs, settings.tiling)
+    box = args.box and np.reshape(args.box, (2, 3))
+    need = estimate_need(args.inputs, settings.tiling, box)
     if need.is_too_large:
         console.note(
             f"{need.n_points:,} points would take about {need.bytes_in_one_piece / GIB:.1f} GiB; "
             f"the limit is {need.limit / GIB:.1f} GiB, so they are processed in tiles."
         )
         beside = args.output.absolute().parent
-        with detect_in_tiles(args.inputs, settings, console, beside) as found:
+        with detect_in_tiles(args.inputs, settings, console, beside, box) as found:
             yield found
         return
-    cloud = io.read(args.inputs, length_unit=settings.input.length_unit, progress=console)
+    unit = settings.input.length_unit
+    cloud = io.read(args.inputs, length_unit=unit, box=box, progress=console)
     yield cloud, detect(cloud, settings, console)
 
 

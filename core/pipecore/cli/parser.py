@@ -74,6 +74,14 @@ def _add_detect(commands: Any) -> None:
         "--settings", type=Path, metavar="FILE.toml", help="settings; flags win over them"
     )
     parser.add_argument(
+        "--box",
+        nargs=6,
+        type=float,
+        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+        help="only points between these two corners, in the file's coordinates; of COPC files "
+        "the rest is not even read",
+    )
+    parser.add_argument(
         "--overwrite", action="store_true", help="replace a report that is already in DIR"
     )
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")

@@ -1,7 +1,7 @@
 """From the chunks of one or several files to one cloud in one local frame."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,9 @@ LOOK_POINTS = 10_000
 FARTHEST = 1e9
 """Coordinates beyond this (metres) lie off any map; they count as invalid, like nan."""
 
+Box = Sequence[Sequence[float]] | Array
+"""Two opposite corners."""
+
 Paths = str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
 
 
@@ -34,6 +37,7 @@ def read(
     paths: Paths,
     *,
     length_unit: LengthUnit = LengthUnit.METRE,
+    box: Box | None = None,
     folder: Path | None = None,
     progress: Progress | None = None,
     look: Callable[[PointCloud], None] | None = None,
@@ -52,6 +56,9 @@ def read(
         Unit of the coordinates in the files. Local coordinates are metres whatever it
         is, and `cloud.world(local)` gives *metres* in the files' coordinate system:
         divide by `length_unit.metres` to get the files' own numbers.
+    box : (2, 3) numbers, optional
+        Two opposite corners, in the files' coordinates: only points between them, both
+        included. Of COPC only the nodes that touch the box are read.
     folder : Path, optional
         Where to keep the points if they are more than memory holds: the cloud's arrays are
         then files in this folder, mapped into memory.
@@ -59,7 +66,8 @@ def read(
         Told about the stage "reading"; may cancel.
     look : callable, optional
         Given a few points of every chunk as soon as it is read, evenly spread over it, as
-        a cloud with the origin of the whole: for showing what comes.
+        a cloud with the origin of the whole: for showing what comes. Of COPC first some from
+        all over the file.
 
     Returns
     -------
@@ -70,32 +78,52 @@ def read(
     Raises
     ------
     ReadError
-        If a file cannot be read as a point cloud, with the file's name and the cause.
+        If a file cannot be read as a point cloud, with the file's name and the cause, or no
+        point lies in the box.
     CancelledError
         From `progress`.
     """
+    corners = None if box is None else corners_of(box)
     files = _as_paths(paths)
     progress = progress or NoProgress()
     progress.update("reading", 0.0)
     recognised = [identify(path) for path in files]
     sizes = np.array([path.stat().st_size for path in files], dtype=np.float64)
     starts = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-    cloud = _GrowingCloud(length_unit.metres, folder)
+    cloud = _GrowingCloud(length_unit.metres, folder, corners)
     for i, path in enumerate(files):
         with recognised[i].open(path) as source:
             before = cloud.n_points
             cloud.begin_file(source, int(sizes[i]))
-            for chunk in source.chunks:
+            for chunk in chunks_of(source, corners):
                 start = cloud.n_points
                 cloud.add(chunk)
                 if look is not None and cloud.n_points > start:
+                    if start == before and source.overview is not None:
+                        look(cloud.of_chunk(source.overview()))
                     look(cloud.part(start, LOOK_POINTS))
                 done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
                 progress.update("reading", min(float(done), 1.0))
-            if cloud.n_points == before:
+            if cloud.n_points == before and corners is None:
                 raise ReadError("“{name}” holds no valid points.", name=path.name)
+    if cloud.n_points == 0:
+        raise ReadError(
+            "No point of “{name}” lies in the box that was asked for.", name=files[0].name
+        )
     progress.update("reading", 1.0)
     return cloud.finish(files[0])
+
+
+def corners_of(box: Box) -> Array:
+    """Lowest and highest corner of a box, shape (2, 3)."""
+    return np.sort(np.asarray(box, np.float64).reshape(2, 3), axis=0)
+
+
+def chunks_of(source: Source, corners: Array | None) -> Iterator[Chunk]:
+    """All chunks of a source, or at least those that hold points in a box."""
+    if corners is None or source.within is None:
+        return source.chunks
+    return source.within(corners)
 
 
 def _as_paths(paths: Paths) -> list[Path]:
@@ -134,8 +162,10 @@ class _Column:
 class _GrowingCloud:
     """A cloud to which chunks are added, never held twice in memory."""
 
-    def __init__(self, metres_per_unit: float, folder: Path | None = None) -> None:
-        self._folder = folder
+    def __init__(
+        self, metres_per_unit: float, folder: Path | None = None, corners: Array | None = None
+    ) -> None:
+        self._folder, self._corners = folder, corners
         self.metres_per_unit = metres_per_unit
         self.n_points = 0
         self.origin: Array | None = None
@@ -170,19 +200,13 @@ class _GrowingCloud:
         self.has_wide_colours = False
         self.crs = self.crs or source.crs
         self.stations.append(source.stations * self.metres_per_unit)
-        if source.n_points is not None:
+        if source.n_points is not None and self._corners is None:
             # A compressed file may announce anything: what its size makes likely is enough.
             self.xyz.resize(self.n_points + min(source.n_points, file_size // 2))
 
     def add(self, chunk: Chunk) -> None:
         """Append the valid points of a chunk."""
-        xyz = chunk.xyz
-        if self.metres_per_unit != 1.0:
-            xyz = xyz * self.metres_per_unit
-        keep: NDArray[np.bool_] | slice = slice(None)
-        if len(xyz) and not (xyz.min() >= -FARTHEST and xyz.max() <= FARTHEST):
-            keep = np.all(np.abs(xyz) <= FARTHEST, axis=1)
-            xyz = xyz[keep]
+        xyz, keep = self._valid(chunk.xyz)
         if not len(xyz):
             return
         if self.origin is None:
@@ -201,6 +225,29 @@ class _GrowingCloud:
             self.classification = self.classification or self._column("classification", np.uint8)
             self.classification.put(self.n_points, chunk.classification[keep])
         self.n_points += len(local)
+
+    def _valid(self, xyz: Array) -> tuple[Array, NDArray[np.bool_] | slice]:
+        """World coordinates in metres of what is to be kept of a chunk, and which points."""
+        is_kept: NDArray[np.bool_] | None = None
+        if self._corners is not None:
+            is_kept = ((xyz >= self._corners[0]) & (xyz <= self._corners[1])).all(axis=1)
+        if self.metres_per_unit != 1.0:
+            xyz = xyz * self.metres_per_unit
+        if is_kept is None and (not len(xyz) or (xyz.min() >= -FARTHEST and xyz.max() <= FARTHEST)):
+            return xyz, slice(None)
+        is_valid = np.all(np.abs(xyz) <= FARTHEST, axis=1)
+        is_kept = is_valid if is_kept is None else is_valid & is_kept
+        return xyz[is_kept], is_kept
+
+    def of_chunk(self, chunk: Chunk) -> PointCloud:
+        """Return the points of a chunk that is not added, as a cloud with the same origin."""
+        assert self.origin is not None
+        xyz, keep = self._valid(chunk.xyz)
+        rgb = None if chunk.rgb is None else chunk.rgb[keep]
+        if rgb is not None and rgb.dtype != np.uint8:
+            rgb = (rgb >> 8 if rgb.max(initial=0) > 255 else rgb).astype(np.uint8)
+        local = (xyz - self.origin).astype(self.xyz.array.dtype)
+        return PointCloud(origin=self.origin, xyz=local, rgb=rgb)  # type: ignore[arg-type]
 
     def _eight_bits(self, rgb: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.uint8]:
         """Return colours as 0 to 255, whichever bits of the 16 the file's writer used."""

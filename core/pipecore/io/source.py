@@ -1,6 +1,6 @@
 """What every format gives: a source, whose points come in chunks."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,6 +60,15 @@ class Source:
     n_scans : int
     stations : ndarray
         Scanner positions, world coordinates in the file's unit, shape (k, 3).
+    overview : callable, optional
+        Gives a few points from all over the file, where they can be had without the others.
+    within : callable, optional
+        Gives the chunks that may hold points between two corners (2, 3), both included, where
+        they can be had without the others.
+    count_within : callable, optional
+        Gives the number of points in those chunks.
+    neighbourhood : callable, optional
+        Gives the coordinates of all points in some small place, in the same case.
     """
 
     chunks: Iterator[Chunk]
@@ -69,6 +78,10 @@ class Source:
     crs: str = ""
     n_scans: int = 1
     stations: Array = field(default_factory=lambda: np.empty((0, 3)))
+    overview: Callable[[], Chunk] | None = None
+    within: Callable[[Array], Iterator[Chunk]] | None = None
+    count_within: Callable[[Array], int] | None = None
+    neighbourhood: Callable[[], Array] | None = None
 
 
 NO_SENSE = "its contents make no sense"

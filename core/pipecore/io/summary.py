@@ -78,7 +78,7 @@ def info(path: str | os.PathLike[str], *, progress: Progress | None = None) -> F
             n_points,
             bounds[0],
             bounds[1],
-            estimate_spacing(sample, n_points),
+            _spacing(source, sample, n_points),
             source.fields,
             source.crs,
             source.n_scans,
@@ -107,6 +107,14 @@ def _survey(source: Source, progress: Progress) -> tuple[int, Array, Array]:
         elif source.bounds is not None and source.n_points is not None:
             return source.n_points, source.bounds, np.concatenate(kept)
     return n_valid, bounds, np.concatenate(kept) if kept else np.empty((0, 3))
+
+
+def _spacing(source: Source, sample: Array, n_points: int) -> float:
+    """Spacing of a file's points: measured where they are all known, else estimated."""
+    if source.neighbourhood is None:
+        return estimate_spacing(sample, n_points)
+    whole = source.neighbourhood()
+    return estimate_spacing(whole, len(whole))
 
 
 MILLIMETRE = 1e-3

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipecore.io import identify
+from pipecore.io import Box, corners_of, identify
 from pipecore.io.mapped import drop_pages
 from pipecore.settings import TilingSettings
 
@@ -50,8 +50,10 @@ class Need:
         return self.bytes_in_one_piece > self.limit
 
 
-def estimate_need(paths: Sequence[Path], settings: TilingSettings) -> Need:
+def estimate_need(paths: Sequence[Path], settings: TilingSettings, box: Box | None = None) -> Need:
     """Compare what the detection in one piece would take with the memory limit.
+
+    Of a box it is known how many points it holds at most where a file has an octree.
 
     Raises
     ------
@@ -61,7 +63,10 @@ def estimate_need(paths: Sequence[Path], settings: TilingSettings) -> Need:
     n_points = 0
     for path in paths:
         with identify(path).open(path) as source:
-            n_points += source.n_points or path.stat().st_size // TEXT_BYTES
+            n_most = source.n_points or path.stat().st_size // TEXT_BYTES
+            if box is not None and source.count_within is not None:
+                n_most = source.count_within(corners_of(box))
+            n_points += n_most
     limit = int(settings.memory_gib * GIB) or int(SHARE_OF_FREE * free_memory())
     return Need(n_points, BASE_BYTES + ONE_PIECE_BYTES * n_points, limit)
 

@@ -14,16 +14,23 @@ from pipecore.types import PointCloud
 
 
 def read_into_store(
-    engine: Engine, paths: Sequence[Path], length_unit: LengthUnit, progress: Progress
+    engine: Engine,
+    paths: Sequence[Path],
+    length_unit: LengthUnit,
+    progress: Progress,
+    box: io.Box | None = None,
 ) -> PointCloud:
     """Read scans as `pipecore.read` does, into arrays in the store.
 
     LAS and LAZ are read in parts, found by their tables of chunks (COPC's nodes are such
-    chunks); other formats, and files that do not keep what their headers say, in order.
+    chunks); other formats, files that do not keep what their headers say, and what lies in
+    a box, in order.
     """
     folder = engine.store.folder
     absolute = [path.absolute() for path in paths]
-    planned = plan_parts(absolute, length_unit, folder) if engine.sees(absolute) else None
+    planned = None
+    if box is None and engine.sees(absolute):
+        planned = plan_parts(absolute, length_unit, folder)
     if planned is not None:
         parts, cloud = planned
         tiles = [(part,) for part in parts]
@@ -31,7 +38,7 @@ def read_into_store(
             return replace(cloud, source=Path(paths[0]))
         del cloud
         remove_parts(folder)
-    return io.read(paths, length_unit=length_unit, folder=folder, progress=progress)
+    return io.read(paths, length_unit=length_unit, box=box, folder=folder, progress=progress)
 
 
 def read_part_into_store(store: Store, part: Part) -> bool:

@@ -92,6 +92,22 @@ def test_that_tiles_find_the_same_with_other_settings(scanned, changes):
         assert_same(found, expected)
 
 
+def test_that_a_box_is_cut_out_of_tiles_as_of_the_whole(scanned, whole, tmp_path, capsys):
+    cloud, _ = whole
+    world = cloud.world(cloud.xyz.astype(np.float64))
+    low, high = world.min(axis=0), world.max(axis=0)
+    box = np.array([low, [low[0] + 2.4, *high[1:]]])
+    part = io.read(scanned, box=box)
+    assert 0.1 < len(part) / len(cloud) < 0.9
+    expected = detect(part, Settings())
+    assert len(expected.elements) >= 1
+    with detect_in_tiles([scanned], Settings().replace(TILES), box=box) as (_, found):
+        assert_same(found, expected)
+    flags = ["--box", *map(str, box.ravel()), "--quiet"]
+    assert main(["detect", str(scanned), "-o", str(tmp_path / "part"), *flags]) == 0
+    assert len(io.read(tmp_path / "part" / "segments.laz")) == len(part)
+
+
 def test_that_several_far_scans_in_any_order_are_the_same_in_tiles(rng, scanned, tmp_path):
     # Further apart than float32 carries, and in no order at all.
     cloud = io.read(scanned)
