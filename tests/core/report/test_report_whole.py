@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pipecore.report
+import pipecore.report.html
 from pipecore.errors import CancelledError, SettingsError, WriteError
 from pipecore.report import by_verdict, result_to_dict, summarise, write_html, write_report
 from pipecore.report.figures import broken_at_gaps
@@ -224,6 +225,17 @@ def test_that_each_deformation_has_a_figure_that_is_whole(page):
     assert len(figures) == len(make_scan()[1].deformations)
     for figure in figures:
         ET.fromstring(figure)
+
+
+def test_that_figures_are_the_same_in_whatever_portions_points_are_looked_up(
+    page, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(pipecore.report.html, "POINTS_AT_ONCE", 1)
+    monkeypatch.setattr(pipecore.report.html, "BLOCK", 333)
+    write_html(tmp_path / "report.html", *make_scan())
+    again = (tmp_path / "report.html").read_text(encoding="utf-8")
+    for pattern in (r"<svg.*?</svg>", r"<figure.*?</figure>"):
+        assert re.findall(pattern, again, re.DOTALL) == re.findall(pattern, page, re.DOTALL)
 
 
 def test_that_names_cannot_put_anything_into_the_page(tmp_path):

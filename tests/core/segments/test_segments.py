@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.testing import assert_array_equal
 
+import pipecore.segments
 from pipecore.geometry import LineAxis
 from pipecore.profiles import Curves, segment_profiles, stack_frame
 from pipecore.progress import NoProgress
@@ -94,3 +95,20 @@ def test_that_a_pipe_is_one_segment_where_stacks_of_different_directions_overlap
 
 def test_that_no_curves_make_no_segments():
     assert_array_equal(overlay_stacks([], 5, NoProgress()), [NO_ID] * 5)
+
+
+def test_that_segments_in_arrays_of_others_and_in_blocks_are_the_same(rng, monkeypatch):
+    groups = [rng.choice(3_000, 40, replace=False) for _ in range(60)]
+    curves = curves_of(groups)
+    expected = overlay_stacks([curves], 3_000, NoProgress())
+    made = []
+
+    def allocate(name, shape, dtype):
+        made.append(name)
+        return np.zeros(shape, dtype)
+
+    monkeypatch.setattr(pipecore.segments, "BLOCK", 100)
+    overlay = Overlay(3_000, allocate)
+    overlay.add(curves.points, curves.starts)
+    assert_array_equal(overlay.number_segments(), expected)
+    assert len(set(made)) == len(made) == 3

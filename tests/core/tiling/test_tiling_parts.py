@@ -4,8 +4,10 @@ import errno
 import itertools
 import os
 import socket
+import time
 
 import numpy as np
+import psutil
 import pytest
 from distributed import LocalCluster
 from numpy.testing import assert_array_equal
@@ -19,9 +21,9 @@ from pipecore.pipeline import detect
 from pipecore.progress import NoProgress
 from pipecore.settings import Settings, TilingSettings
 from pipecore.surface import WIDEST_NEIGHBOURHOOD, average_voxels, fit_planes
-from pipecore.tiling import detect_in_tiles, estimate_need
+from pipecore.tiling import detect_in_tiles, estimate_need, memory
 from pipecore.tiling.engine import start_engine
-from pipecore.tiling.memory import BASE_BYTES, GIB, ONE_PIECE_BYTES, tile_bytes
+from pipecore.tiling.memory import BASE_BYTES, GIB, ONE_PIECE_BYTES, keeping_within, tile_bytes
 from pipecore.tiling.quantile import quantile
 from pipecore.tiling.store import temporary_store
 from pipecore.tiling.thinning import MARGIN, parts_of, slab_bounds
@@ -118,6 +120,30 @@ def test_that_mapped_arrays_keep_what_is_written_when_their_memory_is_given_back
         assert_array_equal(store.open("numbers"), array)
         assert len(store.create("nothing", (0, 3), np.float32)) == 0
     assert not list(tmp_path.iterdir())
+
+
+def test_that_memory_of_files_is_given_back_near_the_limit(tmp_path):
+    n_bytes = 64 * 2**20
+    process = psutil.Process()
+    with temporary_store(tmp_path) as store:
+        array = store.create("numbers", (n_bytes,), np.uint8)
+        array[:] = 1
+        before = process.memory_info().rss
+        with keeping_within(before - n_bytes // 4):
+            for _ in range(200):
+                if before - process.memory_info().rss > 0.8 * n_bytes:
+                    break
+                time.sleep(0.05)
+            else:
+                pytest.fail("the memory was kept")
+        assert (array == 1).all()
+
+
+def test_that_memory_is_left_alone_far_from_the_limit(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "OFTEN", 0.01)
+    monkeypatch.setattr(memory, "drop_pages", lambda: pytest.fail("it was far"))
+    with keeping_within(2**50):
+        time.sleep(0.1)
 
 
 def test_that_a_full_disk_is_told_before_anything_is_lost(scanned, tmp_path, monkeypatch):
