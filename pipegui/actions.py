@@ -31,7 +31,6 @@ class Actions:
                 else:
                     action.triggered.connect(lambda _=False, handler=handler: handler())
                 (self._submenu(menu, spec.submenu) if spec.submenu else menu).addAction(action)
-        self.refresh_icons()
 
     def _submenu(self, menu: QMenu, title: str) -> QMenu:
         if title not in self.menus:
@@ -49,12 +48,6 @@ class Actions:
             for spec in specs
             if spec is not None
         ]
-
-    def refresh_icons(self) -> None:
-        """Draw the icons in the colours of the current scheme."""
-        for spec in SPECS:
-            if spec.icon:
-                self._actions[spec.name].setIcon(theme.icon(spec.icon))
 
     def update(self, conditions: Mapping[str, bool]) -> None:
         """Enable what makes sense now."""
@@ -81,6 +74,8 @@ def _make(spec: ActionSpec, window: QMainWindow) -> QAction:
     action = QAction(tr(spec.text), window)
     action.setObjectName(spec.name)
     action.setCheckable(spec.is_checkable)
+    if spec.icon:
+        theme.set_icon(action, spec.icon)
     action.setShortcut(QKeySequence(spec.shortcut))
     shortcut = action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)
     action.setToolTip(f"{tip} ({shortcut})" if shortcut else tip)

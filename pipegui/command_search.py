@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
-from PySide6.QtGui import QAction, QKeyEvent
+from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QFrame, QLineEdit, QTreeWidget, QTreeWidgetItem, QVBoxLayout, QWidget
 
 from pipegui.texts import tr
@@ -92,6 +92,7 @@ class CommandSearch(QFrame):
         self.list.setColumnCount(3)
         self.list.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.list.setUniformRowHeights(True)
+        self.list.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(SPACING, SPACING, SPACING, SPACING)
         layout.addWidget(self.field)
@@ -121,7 +122,7 @@ class CommandSearch(QFrame):
         self.list.clear()
         for *_, entry in ranked:
             action = entry.action
-            item = QTreeWidgetItem([entry.name, entry.menu, action.shortcut().toString()])
+            item = QTreeWidgetItem([entry.name, entry.menu, _key_of(action)])
             item.setIcon(0, action.icon())
             item.setData(0, Qt.ItemDataRole.UserRole, action)
             item.setToolTip(0, action.statusTip())
@@ -132,7 +133,7 @@ class CommandSearch(QFrame):
             item.setDisabled(True)
             self.list.addTopLevelItem(item)
         self.list.setCurrentItem(self.list.topLevelItem(0))
-        self.list.setColumnWidth(0, 36 * SPACING)
+        self.list.setColumnWidth(0, 34 * SPACING)
         self.list.setColumnWidth(1, 9 * SPACING)
 
     def _run(self, item: QTreeWidgetItem) -> None:
@@ -158,3 +159,7 @@ class CommandSearch(QFrame):
         row = self.list.indexOfTopLevelItem(self.list.currentItem()) + by
         row = min(max(row, 0), self.list.topLevelItemCount() - 1)
         self.list.setCurrentItem(self.list.topLevelItem(row))
+
+
+def _key_of(action: QAction) -> str:
+    return action.shortcut().toString(QKeySequence.SequenceFormat.NativeText)

@@ -265,7 +265,7 @@ class MainWindow(QMainWindow):
         app = QApplication.instance()
         if isinstance(app, QApplication):
             theme.apply_theme(app)
-        self.actions_.refresh_icons()
+        theme.refresh_icons(self)
         self.panels.welcome.refresh_icons()
         self._apply(self._state, everything=True)
 

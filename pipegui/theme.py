@@ -5,8 +5,8 @@ from functools import cache
 
 import qtawesome
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QColor, QGuiApplication, QIcon, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from pipecore.resources import resource
 from pipecore.types import ElementKind, Verdict
@@ -148,6 +148,21 @@ def _tinted(name: str, tint: str) -> QIcon:
     disabled = colour("muted")
     disabled.setAlpha(110)
     return qtawesome.icon(f"mdi6.{name}", color=shade, color_disabled=disabled)
+
+
+def set_icon(target: QAbstractButton | QAction, name: str, tint: str = "") -> None:
+    """Give a button or an action an icon that `refresh_icons` draws anew."""
+    target.setProperty("iconName", name)
+    target.setProperty("iconTint", tint)
+    target.setIcon(icon(name, tint))
+
+
+def refresh_icons(window: QWidget) -> None:
+    """Draw the icons that `set_icon` gave in the colours of the present scheme."""
+    for kind in (QAbstractButton, QAction):
+        for target in window.findChildren(kind):
+            if name := target.property("iconName"):
+                target.setIcon(icon(name, target.property("iconTint")))
 
 
 def verdict_icon(verdict: Verdict) -> QIcon:

@@ -48,6 +48,7 @@ class FilterBar(QWidget):
         self.min_depth.valueChanged.connect(self._change)
         self.everything = QToolButton()
         self.everything.setAutoRaise(True)
+        theme.set_icon(self.everything, "filter-remove-outline")
         self.everything.setToolTip(tr("Show all deformations again"))
         self.everything.setAccessibleName(tr("Show all deformations again"))
         self.everything.clicked.connect(lambda: self.choose({}))
@@ -109,7 +110,6 @@ class FilterBar(QWidget):
         super().changeEvent(event)
 
     def _refresh_icons(self) -> None:
-        self.everything.setIcon(theme.icon("filter-remove-outline"))
         for state in ReviewState:
             row = self.review.findData(state)
             self.review.setItemIcon(row, theme.icon(REVIEW_ICON[state]))

@@ -99,9 +99,8 @@ class DeformationTable(QWidget):
         menu = QMenu(self)
         self.decisions: dict[ReviewState, QAction] = {}
         for state, text in DECISIONS.items():
-            action = self.decisions[state] = menu.addAction(
-                theme.icon(REVIEW_ICON[state]), tr(text)
-            )
+            action = self.decisions[state] = menu.addAction(tr(text))
+            theme.set_icon(action, REVIEW_ICON[state])
             action.triggered.connect(lambda _=False, state=state: self._decide(state))
         menu.addSeparator()
         self._add_keyed(menu, tr("Copy rows"), QKeySequence.StandardKey.Copy, self.copy)
@@ -149,13 +148,6 @@ class DeformationTable(QWidget):
         found = tr("No deformations found: every pipe keeps its shape.")
         self._empty.setText(found if state.result is not None else tr(WAITING))
         self._count()
-
-    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
-        """Draw the icons in the colours of a new scheme."""
-        if event.type() == QEvent.Type.PaletteChange:
-            for state, action in self.decisions.items():
-                action.setIcon(theme.icon(REVIEW_ICON[state]))
-        super().changeEvent(event)
 
     def _show_selected(self) -> None:
         row = self.model.row_of(self._state.selected)

@@ -71,7 +71,7 @@ class MessageBar(QFrame):
         self.text.setText(text)
         icon, tint = _ICONS[severity]
         self._icon.setPixmap(theme.icon(icon, tint).pixmap(theme.icon_size()))
-        self.close_button.setIcon(theme.icon("close", "muted"))
+        theme.set_icon(self.close_button, "close", "muted")
         self.details_button.setVisible(bool(details))
         self.setProperty("severity", severity)
         self.style().unpolish(self)

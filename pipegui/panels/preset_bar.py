@@ -165,7 +165,7 @@ class PresetBar(QWidget):
 
 def _button(icon: str, tip: str) -> QToolButton:
     button = QToolButton()
-    button.setIcon(theme.icon(icon))
+    theme.set_icon(button, icon)
     button.setAutoRaise(True)
     button.setToolTip(tip)
     button.setAccessibleName(tip)

@@ -126,7 +126,7 @@ class SettingsForm(QScrollArea):
 
     def _reset_button(self, tip: str, keys: list[str]) -> QToolButton:
         button = QToolButton()
-        button.setIcon(theme.icon("restore", "muted"))
+        theme.set_icon(button, "restore", "muted")
         button.setIconSize(theme.icon_size(1.75))
         button.setAutoRaise(True)
         button.setToolTip(tip)

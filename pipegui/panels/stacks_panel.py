@@ -129,7 +129,7 @@ class StacksPanel(QWidget):
 
     def _button(self, icon: str, tip: str, act: Callable[[], None]) -> QToolButton:
         button = QToolButton()
-        button.setIcon(theme.icon(icon))
+        theme.set_icon(button, icon)
         button.setAutoRaise(True)
         button.setToolTip(tip)
         button.setAccessibleName(tip)

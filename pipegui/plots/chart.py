@@ -43,7 +43,6 @@ class Chart(QWidget):
     def __init__(self, empty_text: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._dark: bool | None = None
-        self._icons: dict[QToolButton, str] = {}
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.header = QHBoxLayout()
         self.header.setSpacing(SPACING)
@@ -79,7 +78,7 @@ class Chart(QWidget):
         button.setAutoRaise(True)
         button.setToolTip(tip)
         button.setAccessibleName(tip)
-        self._icons[button] = icon
+        theme.set_icon(button, icon)
         return button
 
     def add_plot(self, row: int, left: str, bottom: str = "") -> pg.PlotItem:
@@ -103,8 +102,7 @@ class Chart(QWidget):
         muted = theme.colour("muted").name()
         self.empty.setStyleSheet(f"color: {muted}")
         self.readout.setStyleSheet(f"color: {muted}")
-        for button, icon in self._icons.items():
-            button.setIcon(theme.icon(icon))
+        theme.refresh_icons(self)
         grid = 40 if self._dark else 30
         for plot in self.plots():
             plot.showGrid(x=True, y=True, alpha=grid / 255)

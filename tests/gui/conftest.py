@@ -100,6 +100,14 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture
+def colours_of_the_system(qapp: QApplication) -> Iterator[None]:
+    """For tests that choose dark or light: the next one finds what all others find."""
+    yield
+    theme.choose(theme.Appearance.SYSTEM)
+    theme.apply_theme(qapp)
+
+
+@pytest.fixture
 def german() -> Iterator[None]:
     """The window speaks German."""
     texts.use_language("de")

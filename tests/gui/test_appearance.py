@@ -2,7 +2,7 @@
 
 import pytest
 from PySide6.QtGui import QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication
 
 from pipegui import theme
 
@@ -32,6 +32,25 @@ def test_that_the_chosen_appearance_is_shown_and_kept(make_window):
     assert theme.is_dark()
     other.actions_["appearance_light"].trigger()
     assert luminance(QApplication.palette().color(QPalette.ColorRole.Window)) > 0.8
+
+
+def drawn(button):
+    """Colours of the icon's opaque pixels."""
+    image = button.icon().pixmap(32, 32).toImage()
+    pixels = (image.pixelColor(x, y) for x in range(32) for y in range(32))
+    return [colour for colour in pixels if colour.alpha() > 200]
+
+
+def test_that_icons_follow_the_colours_everywhere(make_window):
+    window = make_window()
+    buttons = [b for b in window.findChildren(QAbstractButton) if b.property("iconName")]
+    assert len(buttons) > 8
+    for name in ("appearance_dark", "appearance_light", "appearance_dark"):
+        window.actions_[name].trigger()
+        ground = QApplication.palette().color(QPalette.ColorRole.Window)
+        for button in [*buttons, window.actions_["undo"], window.actions_["open"]]:
+            button.setEnabled(True)
+            assert max(contrast(c, ground) for c in drawn(button)) > 3, button.toolTip()
 
 
 @pytest.mark.parametrize("dark", [False, True])
