@@ -144,6 +144,7 @@ def list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last)
 def fit_local_axes(
     xyz,
     normals,
+    order,
     cell_keys,
     cell_starts,
     table_keys,
@@ -152,6 +153,7 @@ def fit_local_axes(
     n_z,
     radius,
     sample,
+    own_cells,
     start,
     stop,
     axes,
@@ -159,6 +161,7 @@ def fit_local_axes(
 ):
     """Find the direction that is most perpendicular to the normals around sampled points.
 
+    `order` lists the points cell by cell; `own_cells` are those of the samples.
     Writes, for sample start … stop, the eigenvector of Σ n nᵀ with the smallest
     eigenvalue, and the eigenvalues in ascending order divided by their sum.
     """
@@ -166,7 +169,7 @@ def fit_local_axes(
     for k in range(start, stop):
         i = sample[k]
         px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        cell = np.searchsorted(cell_starts, i, side="right") - 1
+        cell = own_cells[k]
         n = 0
         xx = xy = xz = yy = yz = zz = 0.0
         for dx in range(-1, 2):
@@ -177,7 +180,8 @@ def fit_local_axes(
                     if table_keys[slot] == EMPTY:
                         continue
                     c = table_ids[slot]
-                    for j in range(cell_starts[c], cell_starts[c + 1]):
+                    for row in range(cell_starts[c], cell_starts[c + 1]):
+                        j = order[row]
                         x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
                         if x * x + y * y + z * z <= radius * radius:
                             a, b, d = normals[j, 0], normals[j, 1], normals[j, 2]

@@ -7,7 +7,7 @@ from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
-from pipecore.surface.grid import CellGrid
+from pipecore.surface.grid import CellGrid, GridFrame
 
 Array = NDArray[np.float64]
 
@@ -53,16 +53,15 @@ def axes_at(
     """
     radius = REACH * voxel
     grid = CellGrid.build(points, radius)
-    xyz, normals = points[grid.order], normals[grid.order]
-    place = np.empty(len(points), np.intp)
-    place[grid.order] = np.arange(len(points))
-    place = place[sample]
+    # Few of the points are looked at: they are not copied cell by cell.
+    cells = np.searchsorted(grid.cell_keys, GridFrame.of(points, radius).keys(points[sample]))
     axes, spreads = np.empty((len(sample), 3)), np.empty((len(sample), 3))
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_local_axes(
-            xyz, normals, *grid.lookup, radius, place, start, stop, axes, spreads
-        )
+            points, normals, grid.order, *grid.lookup, radius, sample, cells, start, stop,
+            axes, spreads,
+        )  # fmt: skip
 
     for_chunks(work, len(sample), 2_000, "directions", progress, (0.0, 0.8))
     with np.errstate(invalid="ignore"):

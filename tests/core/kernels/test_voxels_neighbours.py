@@ -145,10 +145,12 @@ def test_that_local_axes_are_those_of_all_normals_within_reach(rng):
     normals[::9] = np.nan
     radius = 0.33
     grid = CellGrid.build(xyz, radius)
-    xyz, normals = xyz[grid.order], normals[grid.order]
     sample = np.arange(0, 80, 2)
+    cells = np.searchsorted(grid.cell_keys, GridFrame.of(xyz, radius).keys(xyz[sample]))
     axes, spreads = np.empty((40, 3)), np.empty((40, 3))
-    neighbours.fit_local_axes(xyz, normals, *grid.lookup, radius, sample, 0, 40, axes, spreads)
+    neighbours.fit_local_axes(
+        xyz, normals, grid.order, *grid.lookup, radius, sample, cells, 0, 40, axes, spreads
+    )
     n_known = 0
     for k, i in enumerate(sample):
         near = (np.linalg.norm(xyz - xyz[i], axis=1) <= radius) & ~np.isnan(normals[:, 0])
