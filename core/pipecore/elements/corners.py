@@ -27,6 +27,10 @@ MAX_TILT = 0.2
 """Largest cosine between its normal and the axis."""
 MIN_SHARE = 0.2
 """Share of the points of a whole plane that must be there, on either side."""
+MAX_TURN = np.deg2rad(10.0)
+"""Most that the normals turn across the part looked at: those of a pipe close by turn more."""
+MAX_ARC = np.deg2rad(225.0)
+"""What is seen further round than this, twice what a corner turns by, is no corner."""
 
 
 def is_rounded_corner(found: Fitted, nearby: NearbyPoints) -> bool:
@@ -38,7 +42,9 @@ def is_rounded_corner(found: Fitted, nearby: NearbyPoints) -> bool:
     nearby : NearbyPoints
     """
     model = found.fit.model
-    return isinstance(model, LineSurface) and min(touching_planes(found, nearby)) > MIN_SHARE
+    if not isinstance(model, LineSurface) or found.extent.arc > MAX_ARC:
+        return False
+    return min(touching_planes(found, nearby)) > MIN_SHARE
 
 
 def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
@@ -69,6 +75,8 @@ def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
     for side in (-1.0, 1.0):
         is_there = touches & (side * lean > nearest) & (side * lean < FURTHEST)
         share = float(is_there.sum()) / (width * density)
+        if abs(_turn(clock - lean, rho * np.sin(lean), is_there)) * width > MAX_TURN:
+            share = 0.0  # a pipe close by has a tangent plane in common with this one
         # The arc that the plane goes on from lies on the other side of where it touches.
         touch = np.exp(1j * (clock - lean)[is_there]).sum()
         behind = side * np.angle(touch * np.exp(-1j * own_clock))
@@ -76,3 +84,12 @@ def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
         is_seen = n_behind > 0.5 * (BEHIND[1] - BEHIND[0]) * radius * density
         shares.append(share if is_seen else 0.0)
     return shares[0], shares[1]
+
+
+def _turn(facing: Array, place: Array, rows: NDArray[np.bool_]) -> float:
+    """By how much the direction that a surface faces turns a metre; 0 of less than three points."""
+    if rows.sum() < 3:
+        return 0.0
+    mean = np.exp(1j * facing[rows]).sum()
+    angle = np.angle(np.exp(1j * facing[rows]) * mean.conjugate())
+    return float(np.polyfit(place[rows], angle, 1)[0])

@@ -54,6 +54,24 @@ def test_that_parallel_pipes_a_centimetre_apart_are_two(rng):
     assert has(elements, other, 1.2)
 
 
+def test_that_a_rack_of_pipes_seen_from_above_is_as_many_pipes(rng):
+    """The middle one has a tangent plane in common with its neighbour on either side."""
+    along, across, up = random_rotation(rng)
+    radii, start, pipes = rng.uniform(0.03, 0.1, 3), rng.uniform(-1, 1, 3), []
+    for i, radius in enumerate(radii):
+        if i:
+            start = start + (radii[i - 1] + radius + 0.01) * across
+        axis = LineAxis(start, along, 1.2)
+        clock_up, clock_right = axis.frame(0.0)
+        middle = np.arctan2(up @ clock_right, up @ clock_up)
+        pipes.append(
+            tube(rng, axis, radius, spacing=0.008, noise=NOISE, arc=2.8, middle_clock=middle)
+        )
+    elements = detect(cloud_of(*pipes)).elements
+    assert len(elements) == 3
+    assert all(has(elements, radius, 1.2) for radius in radii)
+
+
 def test_that_pipes_that_cross_in_contact_are_two(rng):
     q = random_rotation(rng)
     one, other = rng.uniform(0.04, 0.1, 2)
