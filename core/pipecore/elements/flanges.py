@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from pipecore.elements.extent import Extent
 from pipecore.elements.nearby import OUTER, NearbyPoints
@@ -36,6 +37,9 @@ RADIAL_COS = 0.8
 MAX_MISFIT, MAX_NOISE_MISFIT = 0.012, 0.5
 """Largest root mean square of the sectors' distances from the ring, in radii and in noise."""
 MIN_POINTS = 12
+GOES_ON, MISSED_ROWS = 0.5, 2
+"""A ring goes on along rows of points that show this share of `MIN_ARC`, and across so many
+that show less."""
 MAX_CANDIDATES = 12
 """More rings than this are not tried on one pipe."""
 
@@ -119,10 +123,13 @@ def _rings(shell: _Shell, tolerance: float, voxel: float) -> Iterator[tuple[floa
         r0, l0 = np.unravel_index(int(np.argmax(best)), best.shape)
         if best[r0, l0] == 0.0:
             return
+        # A row in which fewer points happen to lie does not end a ring.
+        shows = arc[:, l0] >= GOES_ON * MIN_ARC
+        goes_on = shows | ndimage.binary_closing(shows, np.ones(MISSED_ROWS + 2))
         first = last = int(r0)
-        while first > 0 and is_ring[first - 1, l0]:
+        while first > 0 and goes_on[first - 1]:
             first -= 1
-        while last + 1 < n_rows and is_ring[last + 1, l0]:
+        while last + 1 < n_rows and goes_on[last + 1]:
             last += 1
         is_ring[max(first - 1, 0) : last + 2] = False
         members = (row >= first) & (row <= last) & ((level == l0) | (level == l0 - 1))
