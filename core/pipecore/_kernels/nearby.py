@@ -61,22 +61,23 @@ def distance_from_axis(axis, x, y, z):
 @njit(cache=True, nogil=True)
 def cells_around(
     low, edge, n_y, n_z, table_keys, table_ids, cell_starts, middles, half_cell,
-    axis, inner, outer, margin,
+    axis, inner, outer, begin, end,
 ):  # fmt: skip
     """Fine cells that may hold points between two distances from an axis.
 
-    The axis is walked in steps; each coarse cell is taken at the step that is nearest to it.
+    The axis is walked from the chainage `begin` to `end` in steps; each coarse cell is taken
+    at the step that is nearest to it.
     """
     mask = np.int64(table_keys.shape[0] - 1)
     half_coarse = 0.5 * math.sqrt(3.0) * edge
-    length = axis[16] + 2.0 * margin
+    length = end - begin
     n_steps = max(1, math.ceil(length / max(1.5 * outer, 2.0 * edge)))
     step = length / n_steps
     reach = outer + 0.5 * step + half_coarse
     cells = np.empty(256, np.int64)
     n = 0
     for k in range(n_steps):
-        px, py, pz = place_on_axis(axis, (k + 0.5) * step - margin)
+        px, py, pz = place_on_axis(axis, begin + (k + 0.5) * step)
         ix0 = max(math.floor((px - reach - low[0]) / edge), 0)
         ix1 = math.floor((px + reach - low[0]) / edge)
         iy0 = max(math.floor((py - reach - low[1]) / edge), 0)
@@ -96,7 +97,7 @@ def cells_around(
                     if table_keys[slot] == EMPTY:
                         continue
                     chainage, _, _ = across_axis(axis, x, y, z)
-                    nearest = math.floor((chainage + margin) / step)
+                    nearest = math.floor((chainage - begin) / step)
                     if min(max(nearest, 0), n_steps - 1) != k:
                         continue
                     c = table_ids[slot]
@@ -187,12 +188,17 @@ def points_in_ball(xyz, members, starts, cells, place, radius):
 
 
 @njit(cache=True, nogil=True)
-def points_on_sphere(xyz, normals, is_free, members, starts, cells, centre, inner, outer, min_cos):
-    """Free points of some cells between two distances from a place whose normals point to it."""
+def points_on_sphere(
+    xyz, normals, is_free, members, starts, cells, centre, inner, outer, min_cos, stride
+):
+    """Free points of some cells between two distances from a place whose normals point to it.
+
+    Of the cells' points only every `stride`-th is looked at.
+    """
     found = np.empty(256, np.int64)
     n = 0
     for c in cells:
-        for m in range(starts[c], starts[c + 1]):
+        for m in range(starts[c] + (-starts[c]) % stride, starts[c + 1], stride):
             i = members[m]
             if not is_free[i]:
                 continue
@@ -211,12 +217,13 @@ def points_on_sphere(xyz, normals, is_free, members, starts, cells, centre, inne
 @njit(cache=True, nogil=True)
 def points_on(
     xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
-    kind, surface, band, min_cos,
+    kind, surface, band, min_cos, stride,
 ):  # fmt: skip
     """Free points of some cells that lie on a surface about an axis.
 
     That are points within `band` of it, between two distances from the axis, with normals
-    like its own (cosine above `min_cos`). Returns, in the order of their indices, the indices
+    like its own (cosine above `min_cos`); of the cells' points only every `stride`-th is
+    looked at. Returns, in the order of their indices, the indices
     and (n, 4): distance, chainage, clock, and the angle from the surface's normal to the
     point's own towards increasing clock.
     """
@@ -224,11 +231,13 @@ def points_on(
     row = np.empty(MOST_PARAMETERS)
     n = 0
     for c in cells:
-        for m in range(starts[c], starts[c + 1]):
+        for m in range(starts[c] + (-starts[c]) % stride, starts[c + 1], stride):
             i = members[m]
+            if not is_free[i]:
+                continue
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
             residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
-            if not abs(residual) < band or not is_free[i]:
+            if not abs(residual) < band:
                 continue
             cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
             if not abs(cosine) > min_cos:
@@ -257,9 +266,13 @@ def points_on(
 
 @njit(cache=True, nogil=True)
 def points_inside(
-    xyz, normals, members, starts, cells, axis, inner, outer, margin, kind, surface, depth, min_cos
-):
-    """Chainage and clock (m, 2) of points deeper than `depth` inside a surface, as `points_on`."""
+    xyz, normals, members, starts, cells, axis, inner, outer, begin, end,
+    kind, surface, depth, min_cos,
+):  # fmt: skip
+    """Chainage and clock (m, 2) of points deeper than `depth` inside a surface, as `points_on`.
+
+    Only between the chainages `begin` and `end`.
+    """
     table = np.empty((256, 2))
     row = np.empty(MOST_PARAMETERS)
     n = 0
@@ -275,7 +288,7 @@ def points_inside(
                 continue
             chainage, up, right = across_axis(axis, x, y, z)
             rho, clock = polar(up, right)
-            if inner < rho < outer and -margin < chainage < axis[16] + margin:
+            if inner < rho < outer and begin < chainage < end:
                 if n == table.shape[0]:
                     longer = np.empty((2 * n, 2))
                     longer[:n] = table

@@ -312,9 +312,8 @@ def _fitted(
     own = ball[on]
     chainage, _, clock = axis.pipe_coordinates(xyz[on])
     lean = lean_of(normals[on], outward[on], axis.tangent(chainage))
-    nothing = np.empty(0)
     extent = find_extent(
-        chainage, clock, residual[on], lean, (nothing, nothing),
+        chainage, clock, residual[on], lean, lambda *_: np.empty((2, 0)),
         axis.length, radius, nearby.usual_spacing(own), sigma,
     )  # fmt: skip
     if extent is None:

@@ -1,6 +1,6 @@
 """How far a surface reaches along its axis, and whether its section is round."""
 
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from pipecore._kernels import extent as kernels
+from pipecore._kernels import misfit as misfit_kernels
 
 Array = NDArray[np.float64]
 
@@ -28,6 +29,8 @@ OVAL_SHARE = 0.6
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
+LEAST_IN_SECTOR = 5, 0.02
+"""Sectors of fewer points, or of a smaller share of all, tell nothing of the section."""
 MIN_NARROWER_ARC = float(np.deg2rad(75.0))
 """A dent shows less of an arc inside the surface than a narrower pipe does."""
 LONGEST_STEP = 0.03
@@ -62,7 +65,7 @@ def find_extent(
     clock: Array,
     residual: Array,
     lean: Array,
-    inside: Iterable[Array],
+    inside: Callable[[float, float], Array],
     length: float,
     radius: float,
     spacing: float,
@@ -83,9 +86,9 @@ def find_extent(
         Of the points near the surface.
     lean : ndarray, shape (n,)
         Angle from the surface's normal to each point's own, towards increasing clock.
-    inside : iterable of two ndarrays, each of shape (m,)
-        Chainage and clock of points well inside the surface that face as it does. Asked for
-        only where there are gaps.
+    inside : callable
+        Asked, only where there are gaps, for chainage and clock, shape (2, m), of the points
+        well inside the surface that face as it does, between two chainages.
     length : float
         The proposed extent is chainage 0 … `length`.
     radius, spacing, sigma : float
@@ -130,8 +133,10 @@ def find_extent(
         return None
     longest_gap = max(MAX_GAP * radius, MAX_GAP_LENGTH)
     arc_in_gaps = np.zeros(len(covered) - 1)
-    if (np.diff(covered) > 1).any():
-        chainage_inside, clock_inside = inside
+    gaps = np.flatnonzero(np.diff(covered) > 1)
+    if len(gaps):
+        begin, end = covered[gaps[0]] + 1, covered[gaps[-1] + 1]
+        chainage_inside, clock_inside = inside(base + begin * step, base + end * step)
         seen_inside = _seen_by_row(chainage_inside, clock_inside, base, step, n_rows)
         total = seen_inside.cumsum(axis=0)
         in_gaps = total[covered[1:] - 1] > total[covered[:-1]]
@@ -221,18 +226,7 @@ def section_misfit(clock: Array, residual: Array, arc: float) -> float:
     Those shapes are the circle and, where the arc can tell, the oval. Corners of boxes
     and the flanges of beams keep a residual of their own in every sector around the axis.
     """
-    sector = (clock / (2 * np.pi) * MAX_SECTORS).astype(np.intp) % MAX_SECTORS
-    counts = np.bincount(sector, minlength=MAX_SECTORS)
-    median = _median_by_row(residual, sector, MAX_SECTORS)
-    used = counts >= max(5, 0.02 * len(clock))
-    angle = (np.flatnonzero(used) + 0.5) * (2 * np.pi / MAX_SECTORS)
-    n_harmonics = 2 if arc > np.deg2rad(200.0) else 1
-    terms = [np.ones_like(angle)]
-    for k in range(1, n_harmonics + 1):
-        terms += [np.cos(k * angle), np.sin(k * angle)]
-    design = np.stack(terms, axis=1)
-    if len(angle) <= design.shape[1] + 2:
-        return 0.0
-    solution = np.linalg.lstsq(design, median[used], rcond=None)[0]
-    left = median[used] - design @ solution
-    return float(np.sqrt((left**2).sum() / (len(angle) - design.shape[1])))
+    n_harmonics = 2 if arc > OVAL_ARC else 1
+    return float(
+        misfit_kernels.section_misfit(clock, residual, MAX_SECTORS, *LEAST_IN_SECTOR, n_harmonics)
+    )

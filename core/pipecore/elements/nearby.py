@@ -1,6 +1,6 @@
 """All points of the full cloud around an axis."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,9 @@ REACH_OF_SPHERE = 1.2
 CELL_VOXELS, COARSE = 6.0, 4
 """Edge of the cells in which thinned points are looked up, in voxels; coarse ones in fine ones."""
 
+FEW = 20_000
+"""A rough look takes a sample where more points than this are in the cells about a surface."""
+
 AT_ONCE, BEGUN = 2_000_000, 0.3
 """Points put into cells between two words to the progress, and what it is told."""
 
@@ -41,7 +44,11 @@ class PointsOn:
     residual, chainage, clock, lean : ndarray, shape (n,)
         Distance from the surface, pipe coordinates, and the angle from the surface's normal
         to the point's own, towards increasing clock.
-    inside : PointsInside
+    inside : callable
+        Takes the chainages between which it is asked for, and returns chainage and clock of
+        the points well inside the surface that face as it does, shape (2, m).
+    spacing : float
+        Distance between neighbours among the points looked at, metres.
     """
 
     own: Indices
@@ -49,20 +56,8 @@ class PointsOn:
     chainage: Array
     clock: Array
     lean: Array
-    inside: "PointsInside"
-
-
-class PointsInside:
-    """Chainage and clock of points well inside a surface that face as it does.
-
-    They are looked up when they are asked for: seldom.
-    """
-
-    def __init__(self, look_up: Callable[[], Array]) -> None:
-        self._look_up = look_up
-
-    def __iter__(self) -> Iterator[Array]:
-        return iter(self._look_up().T)
+    inside: Callable[[float, float], Array]
+    spacing: float
 
 
 def _in_order_met(
@@ -136,7 +131,9 @@ class NearbyPoints:
     def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
         inner, outer = INNER * radius, OUTER * radius
-        cells = kernels.cells_around(*self._grid, axis.numbers, inner, outer, margin)
+        cells = kernels.cells_around(
+            *self._grid, axis.numbers, inner, outer, -margin, axis.length + margin
+        )
         return np.asarray(
             kernels.points_around(
                 self.surface.xyz, *self._cells, cells, axis.numbers, inner, outer, margin
@@ -153,6 +150,7 @@ class NearbyPoints:
         band: float,
         depth: float,
         min_cos: float,
+        is_rough: bool = False,
     ) -> PointsOn:
         """Free thinned points on a surface about an axis, and what lies inside it.
 
@@ -169,6 +167,8 @@ class NearbyPoints:
             Points are on it up to the former distance, and inside from the latter on.
         min_cos : float
             Least cosine between a point's normal and the surface's.
+        is_rough : bool
+            Whether a sample of the points will do where there are many.
         """
         inner, outer = INNER * model.radius, OUTER * model.radius
         numbers, shape = axis.numbers, (model.kind, model.numbers())
@@ -177,34 +177,51 @@ class NearbyPoints:
         shell = inner, outer
         if not model.is_conical:
             shell = max(inner, model.radius - band), min(outer, model.radius + band)
-        cells = kernels.cells_around(*self._grid, numbers, *shell, margin)
+        cells = kernels.cells_around(*self._grid, numbers, *shell, -margin, axis.length + margin)
+        stride = self._stride(cells) if is_rough else 1
         own, table = kernels.points_on(
             *points, is_free, *self._cells, cells, numbers, inner, outer, margin,
-            *shape, band, min_cos,
+            *shape, band, min_cos, stride,
         )  # fmt: skip
         residual, chainage, clock, lean = np.ascontiguousarray(table.T)
 
-        def look_inside() -> Array:
-            cells = kernels.cells_around(*self._grid, numbers, inner, outer, margin)
+        def look_inside(begin: float, end: float) -> Array:
+            cells = kernels.cells_around(*self._grid, numbers, inner, outer, begin, end)
             found: Array = kernels.points_inside(
-                *points, *self._cells, cells, numbers, inner, outer, margin,
+                *points, *self._cells, cells, numbers, inner, outer, begin, end,
                 *shape, depth, min_cos,
             )  # fmt: skip
-            return found
+            return found.T
 
-        return PointsOn(own, residual, chainage, clock, lean, PointsInside(look_inside))
+        spacing = self.usual_spacing(own) * np.sqrt(stride)
+        return PointsOn(own, residual, chainage, clock, lean, look_inside, spacing)
+
+    def _stride(self, cells: Indices) -> int:
+        """How many times as many points as few some cells hold."""
+        starts = self._cells[1]
+        return max(1, -int(-(starts[cells + 1] - starts[cells]).sum() // FEW))
 
     def on_sphere(
-        self, model: SphereSurface, is_free: NDArray[np.bool_], *, band: float, min_cos: float
+        self,
+        model: SphereSurface,
+        is_free: NDArray[np.bool_],
+        *,
+        band: float,
+        min_cos: float,
+        is_rough: bool = False,
     ) -> Indices:
-        """Free thinned points within `band` of a sphere whose normals are like its own."""
+        """Free thinned points within `band` of a sphere whose normals are like its own.
+
+        A rough look takes a sample of them where there are many.
+        """
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
         inner = model.radius - band
         cells = kernels.cells_in_shell(*self._grid, model.centre, inner, outer)
+        stride = self._stride(cells) if is_rough else 1
         return np.asarray(
             kernels.points_on_sphere(
                 self.surface.xyz, self.surface.normals, is_free, *self._cells, cells,
-                model.centre, inner, outer, min_cos,
+                model.centre, inner, outer, min_cos, stride,
             )
         )  # fmt: skip
 
@@ -221,14 +238,22 @@ class NearbyPoints:
             kernels.points_in_ball(self.surface.xyz, *self._cells, cells, centre, radius)
         )
 
-    def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:
-        """Indices, coordinates and normals (of their thinned point) of the cloud's points.
+    def behind(self, thinned: Indices) -> tuple[Indices, Array]:
+        """Indices and coordinates of the cloud's points behind thinned points.
 
-        Points behind one thinned point are in the order of their coordinates, so that the
+        Those behind one thinned point are in the order of their coordinates, so that the
         cloud's own order does not matter.
         """
-        sizes = self._starts[thinned + 1] - self._starts[thinned]
-        n = int(sizes.sum())
+        n = int(self._n_behind(thinned).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
         kernels.behind(self._members, self._starts, thinned, self._cloud.xyz, index, xyz)
-        return index, xyz, np.repeat(self.surface.normals[thinned], sizes, axis=0)
+        return index, xyz
+
+    def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:
+        """What `behind` tells, and the normals of the thinned points, one for each point."""
+        index, xyz = self.behind(thinned)
+        normals = np.repeat(self.surface.normals[thinned], self._n_behind(thinned), axis=0)
+        return index, xyz, normals
+
+    def _n_behind(self, thinned: Indices) -> Indices:
+        return np.asarray(self._starts[thinned + 1] - self._starts[thinned], np.intp)

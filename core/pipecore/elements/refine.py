@@ -1,7 +1,8 @@
 """Refinement: a robust geometric fit of each piece to all points around it, and its extent."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,20 +31,27 @@ from pipecore.geometry import ArcAxis, LineAxis, cross
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
+AnySurface = LineSurface | ArcSurface | SphereSurface
 
 RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
 """A point belongs to a surface only if its normal is this close to the surface's."""
 CLEAR_COS = float(np.cos(np.deg2rad(15.0)))
 """Beside bands the normals of the pipe's own points are this close to the surface's."""
-MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 4_000
+MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 1_500
 """Larger elements are fitted to an even sample of this many points; fewer in early rounds."""
+LEAST_POINTS, SURE_POINTS, MANY_POINTS = 15, 4_000, 6_000
+"""No fit takes fewer points. What early rounds are unsure of is judged as if they had used up
+to so many points. More than many are fitted to at last if so many of them hold."""
+AGAIN = 1.5
+"""A fit that starts from that of a sample takes so many times its standard deviation."""
 INSIDE = 0.1
 """Points are well inside a surface from this share of its radius on."""
 MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
 N_ROUNDS = 3
-ROUGH, VERY_ROUGH = 1.5, 3.0
-"""Slack for pieces whose last round of fitting is still to come, or whose last two are."""
+HARDLY_ROUGH, ROUGH, VERY_ROUGH = 1.15, 1.5, 3.0
+"""Slack for pieces fitted to a sample at last, and for those whose last round of fitting is
+still to come, or whose last two are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +134,8 @@ def refine_piece(
     model = piece.model
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     axis = axis_between(model, piece.low, piece.high)
-    fitted = None
+    fitted: Fitted | None = None
+    fit: SurfaceFit[Any] | None
     for round_ in range(N_ROUNDS):
         is_final = round_ == N_ROUNDS - 1
         if is_final and not (fitted and is_promising(fitted, ROUGH)):
@@ -135,13 +144,13 @@ def refine_piece(
         near = nearby.on_surface(
             model, axis, margin, is_free,
             band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
+            is_rough=not is_final,
         )  # fmt: skip
         used.append(near.own)
         chainage, clock = near.chainage, near.clock
-        spacing = nearby.usual_spacing(near.own)
         extent = find_extent(
             chainage, clock, near.residual, near.lean, near.inside,
-            axis.length, model.radius, spacing, sigma,
+            axis.length, model.radius, near.spacing, sigma,
         )  # fmt: skip
         if extent is None:
             return None
@@ -150,14 +159,19 @@ def refine_piece(
         clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
         core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
         chosen = near.own[core if core.sum() > 30 else within]
+        misfit = section_misfit(clock[within], near.residual[within], extent.arc)
+        own = near.own[within]
         if is_final:
-            fit = fit_measured(model, chosen, nearby, 3.0 * sigma, spacing)
+            told = partial(Fitted, axis=axis, own=own, extent=extent, misfit=misfit)
+            fit = fit_measured(
+                model, chosen, nearby, 3.0 * sigma, near.spacing,
+                partial(_holds, is_promising, told),
+            )  # fmt: skip
         else:
-            fit = _fit_to(model, chosen, nearby, 3.0 * sigma, False)
+            fit = _fit_roughly(model, chosen, nearby, 3.0 * sigma)
         if fit is None:
             return None
-        misfit = section_misfit(clock[within], near.residual[within], extent.arc)
-        fitted = Fitted(fit, axis, near.own[within], extent, misfit)
+        fitted = Fitted(fit, axis, own, extent, misfit)
         model = fit.model
         axis = axis_through(model, axis.at(np.array([extent.low, extent.high])))
         sigma = max(fit.sigma, 0.0005)
@@ -211,39 +225,53 @@ def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
     return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
 
 
-def _fit_to(
-    model: LineSurface | ArcSurface | SphereSurface,
-    thinned: Indices,
-    nearby: NearbyPoints,
-    scale: float,
-    is_final: bool,
+def _fit_roughly(
+    model: AnySurface, thinned: Indices, nearby: NearbyPoints, scale: float
 ) -> SurfaceFit[Any] | None:
-    """Fit the model to thinned points; in the last round to all points of the cloud behind them."""
-    if len(thinned) < 15:
+    """Fit the model to thinned points."""
+    if len(thinned) < LEAST_POINTS:
         return None
-    if is_final:
-        _, points, _ = nearby.of_cloud(thinned)
-        points = _evenly(points, MAX_FIT_POINTS)
-    else:
-        points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
-    fit = fit_surface(model, points, scale)
-    if fit is None or abs(fit.model.radius - model.radius) > MAX_RADIUS_CHANGE * model.radius:
+    points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
+    return _fit_sample(model, points, scale, min(len(thinned), SURE_POINTS))
+
+
+def _holds(
+    is_promising: Callable[[Fitted, float], bool],
+    told: Callable[[SurfaceFit[Any]], Fitted],
+    fit: SurfaceFit[Any],
+) -> bool:
+    """Whether a piece is promising with the fit of a sample."""
+    return is_promising(told(fit), HARDLY_ROUGH)
+
+
+def _fit_sample(
+    model: AnySurface, points: Array, scale: float, n_all: int
+) -> SurfaceFit[Any] | None:
+    """Fit the model to a sample; it is as sure of it as `n_all` points would be."""
+    fit = fit_surface(model, points, scale, is_rough=True)
+    if fit is None or not _is_still(fit, model):
         return None
-    return fit
+    return replace(fit, covariance=fit.covariance * min(len(points) / n_all, 1.0))
+
+
+def _is_still(fit: SurfaceFit[Any], model: AnySurface) -> bool:
+    """Whether a fit found what was proposed."""
+    return bool(abs(fit.model.radius - model.radius) <= MAX_RADIUS_CHANGE * model.radius)
 
 
 def fit_measured(
-    model: LineSurface | ArcSurface,
+    model: AnySurface,
     thinned: Indices,
     nearby: NearbyPoints,
     scale: float,
     spacing: float,
+    holds: Callable[[SurfaceFit[Any]], bool] = lambda fit: True,
 ) -> SurfaceFit[Any] | None:
     """Fit a model as elements are measured: to all points, free of bands around the pipe.
 
     Parameters
     ----------
-    model : LineSurface or ArcSurface
+    model : LineSurface, ArcSurface or SphereSurface
         Where to start.
     thinned : ndarray of int
         Thinned points on the surface.
@@ -252,33 +280,56 @@ def fit_measured(
         Distance from the surface up to which points count in full, metres.
     spacing : float
         Distance between neighbouring thinned points, metres.
+    holds : callable
+        Asked of the fit to a sample of many points, from which that to all begins.
 
     Returns
     -------
     SurfaceFit or None
         None where the points do not carry the surface, or carry quite another one.
     """
-    fit = _fit_to(model, thinned, nearby, scale, True)
-    if fit is None or not isinstance(fit.model, LineSurface):
+    if len(thinned) < LEAST_POINTS:
+        return None
+    _, points = nearby.behind(thinned)
+    points = _evenly(points, MAX_FIT_POINTS)
+    start = model
+    if len(points) > MANY_POINTS:
+        sampled = _fit_sample(model, _evenly(points, SURE_POINTS), scale, len(points))
+        if sampled is None or not (
+            holds(sampled) or _off_bands(sampled, thinned, nearby, spacing) is not None
+        ):
+            return None
+        start, scale = sampled.model, AGAIN * sampled.sigma
+    fit = fit_surface(start, points, scale)
+    if fit is None or not _is_still(fit, model):
+        return None
+    own = _off_bands(fit, thinned, nearby, spacing)
+    if own is None:
         return fit
-    return _fit_off_bands(fit, thinned, nearby, spacing)
+    if len(own) >= LEAST_POINTS:
+        _, points = nearby.behind(own)
+        fit = fit_surface(fit.model, _evenly(points, MAX_FIT_POINTS), 3.0 * fit.sigma)
+        if fit is not None and _is_still(fit, model):
+            return fit
+    return None
 
 
-def _fit_off_bands(
-    fit: SurfaceFit[LineSurface], thinned: Indices, nearby: NearbyPoints, spacing: float
-) -> SurfaceFit[Any] | None:
-    """The fit, once more without the bands around the pipe where there are some."""
+def _off_bands(
+    fit: SurfaceFit[Any], thinned: Indices, nearby: NearbyPoints, spacing: float
+) -> Indices | None:
+    """The points that are not of bands around a pipe; None where there are none of those."""
     model = fit.model
+    if not isinstance(model, LineSurface):
+        return None
     xyz = nearby.surface.xyz[thinned]
     chainage = (xyz - model.middle) @ model.direction
     residual, _, outward = model.residuals(xyz)
     is_own = is_off_bands(chainage, residual, spacing, model.radius)
     if is_own is None:
-        return fit
+        return None
     # Where a band or a rib meets the pipe, the normals turn away before the points do.
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
-    is_own &= cosine > CLEAR_COS
-    return _fit_to(model, thinned[is_own], nearby, 3.0 * fit.sigma, True)
+    return np.asarray(thinned[is_own & (cosine > CLEAR_COS)], np.intp)
 
 
 def _refine_sphere(
@@ -294,9 +345,14 @@ def _refine_sphere(
         is_final = round_ == N_ROUNDS - 1
         if is_final and not (fitted and is_promising(fitted, ROUGH)):
             return None
-        own = nearby.on_sphere(model, is_free, band=_band(sigma), min_cos=RADIAL_COS)
+        own = nearby.on_sphere(
+            model, is_free, band=_band(sigma), min_cos=RADIAL_COS, is_rough=not is_final
+        )
         used.append(own)
-        fit = _fit_to(model, own, nearby, 3.0 * sigma, is_final)
+        if is_final:
+            fit = fit_measured(model, own, nearby, 3.0 * sigma, nearby.surface.voxel)
+        else:
+            fit = _fit_roughly(model, own, nearby, 3.0 * sigma)
         if fit is None:
             return None
         model = fit.model

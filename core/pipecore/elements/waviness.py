@@ -8,6 +8,7 @@ more than the scatter of the points explains.
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels.misfit import least_distances
 from pipecore.elements.surfaces import robust_sigma
 
 Array = NDArray[np.float64]
@@ -53,7 +54,10 @@ def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc:
     n_sectors = int(np.clip(2 * np.pi * radius / CELL_WIDTH, *SECTORS))
     row = np.floor((chainage - chainage.min()) / step).astype(np.intp)
     sector = (clock / (2 * np.pi) * n_sectors).astype(np.intp) % n_sectors
-    cell, of_cell, n = np.unique(row * n_sectors + sector, return_inverse=True, return_counts=True)
+    place = row * n_sectors + sector
+    in_place = np.bincount(place)
+    cell = np.flatnonzero(in_place)
+    n, of_cell = in_place[cell], (np.cumsum(in_place > 0) - 1)[place]
     mean = np.bincount(of_cell, residual) / n
     used = n >= MIN_IN_CELL
     if used.sum() < MIN_CELLS:
@@ -65,13 +69,7 @@ def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc:
     within = (residual - mean[of_cell]) * np.sqrt(n / np.maximum(n - 1.0, 1.0))[of_cell]
     noise = max(robust_sigma(within[used[of_cell]]), 1e-6)
     mean, expected = mean[used], noise / np.sqrt(n[used])
-    left = mean
-    weight = 1.0 / expected
-    for _ in range(N_STEPS):
-        solution = np.linalg.lstsq(design * weight[:, None], mean * weight, rcond=None)[0]
-        left = mean - design @ solution
-        # Weights of the least sum of distances, levelled where noise is all there is.
-        weight = 1.0 / expected / np.sqrt(np.maximum(np.abs(left), expected))
+    left = least_distances(design, mean, expected, N_STEPS)
     scatter = np.median(np.square(left / expected)) / HALF_OF_SQUARES
     if scatter < 1.0 + SURE * np.sqrt(VARIANCE_OF_MEDIAN / len(left)):
         return 0.0

@@ -35,7 +35,12 @@ NOTHING = np.empty(0), np.empty(0)
 
 def extent_of(*parts, length=1.0, inside=NOTHING):
     chainage, clock, residual, lean = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return find_extent(chainage, clock, residual, lean, inside, length, RADIUS, VOXEL, NOISE)
+
+    def look_inside(begin, end):
+        within = (inside[0] > begin) & (inside[0] < end)
+        return np.stack(inside)[:, within]
+
+    return find_extent(chainage, clock, residual, lean, look_inside, length, RADIUS, VOXEL, NOISE)
 
 
 def test_that_the_extent_grows_to_where_the_points_end(rng):
@@ -123,9 +128,7 @@ def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
 def test_that_a_surface_without_points_has_no_extent(rng):
     nothing = np.empty(0)
     assert (
-        find_extent(
-            nothing, nothing, nothing, nothing, (nothing, nothing), 1.0, RADIUS, VOXEL, NOISE
-        )
+        find_extent(nothing, nothing, nothing, nothing, lambda *_: None, 1.0, RADIUS, VOXEL, NOISE)
         is None
     )
     assert extent_of(wall_points(rng, 5.0, 6.0)) is None

@@ -217,10 +217,38 @@ def test_that_points_on_a_surface_are_told_from_those_inside(rng, which):
     clockwise = np.cross(axis.tangent(chainage[on]), outward[on])
     ahead = np.einsum("ij,ij->i", normals[on], clockwise)
     assert_allclose(found.lean, np.arctan(ahead / cosine[on]), atol=1e-9)
-    inside = like & (residual < -0.02)
-    assert inside.any()
-    for one, other in zip(found.inside, (chainage, clock), strict=True):
-        assert_allclose(np.sort(one), np.sort(other[inside]), atol=1e-12)
+    for begin, end in ((-margin, axis.length + margin), (0.1, 0.6 * axis.length)):
+        inside = like & (residual < -0.02) & (chainage > begin) & (chainage < end)
+        assert inside.any()
+        for one, other in zip(found.inside(begin, end), (chainage, clock), strict=True):
+            assert_allclose(np.sort(one), np.sort(other[inside]), atol=1e-12)
+
+
+@pytest.mark.parametrize("is_sphere", [False, True])
+def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch, is_sphere):
+    axis = LineAxis(np.zeros(3), np.array([0.0, 0.0, 1.0]), 1.0)
+    points, _, _ = cloud_around(rng, axis, n=4000)
+    is_free = np.ones(len(points.surface.xyz), np.bool_)
+
+    def found(is_rough):
+        if is_sphere:
+            model = SphereSurface(np.array([0.0, 0.0, 0.5]), 0.2)
+            return points.on_sphere(model, is_free, band=0.1, min_cos=0.0, is_rough=is_rough), 0.01
+        near = points.on_surface(
+            LineSurface(axis.at(0.5), axis.direction, 0.15), axis, 0.0, is_free,
+            band=0.1, depth=0.1, min_cos=0.0, is_rough=is_rough,
+        )  # fmt: skip
+        return near.own, near.spacing
+
+    every, spacing = found(is_rough=False)
+    assert_array_equal(found(is_rough=True)[0], every)
+    monkeypatch.setattr("pipecore.elements.nearby.FEW", 200)
+    some, wider = found(is_rough=True)
+    assert np.isin(some, every).all()
+    assert 10 < len(some) < 220 < len(every)
+    if not is_sphere:
+        assert wider == pytest.approx(spacing * np.sqrt(len(every) / len(some)), rel=0.4)
+    assert_array_equal(found(is_rough=False)[0], every)
 
 
 def test_that_points_behind_thinned_ones_are_in_the_order_of_their_places(rng):
