@@ -10,10 +10,14 @@ from numba import njit
 def write_terms(theta, order, derivative, terms):
     """Write 1, cos θ, sin θ, cos 2θ … (2·order + 1,) at an angle, or their derivative."""
     terms[0] = 0.0 if derivative else 1.0
+    cos_1, sin_1 = math.cos(theta), math.sin(theta)
+    cos, sin = 1.0, 0.0
     for k in range(1, order + 1):
-        phase = theta * k + derivative * 0.5 * math.pi
-        scale = float(k) ** derivative
-        terms[2 * k - 1], terms[2 * k] = scale * math.cos(phase), scale * math.sin(phase)
+        cos, sin = cos * cos_1 - sin * sin_1, sin * cos_1 + cos * sin_1
+        a, b = cos, sin
+        for _ in range(derivative):
+            a, b = -k * b, k * a
+        terms[2 * k - 1], terms[2 * k] = a, b
 
 
 @njit(cache=True, nogil=True)
@@ -123,3 +127,197 @@ def curvature(theta, coefficients, root, values, variances):
         values[i] = (r * r + 2.0 * slope * slope - r * bend) / (r * r + slope * slope) ** 1.5
         variances[i] = spread / (r * r) ** 2
     return mean
+
+
+@njit(cache=True, nogil=True)
+def spans_of(ordered, max_gap, least, spans):
+    """Write the arcs between gaps wider than `max_gap` of angles in order; return how many.
+
+    Arcs no longer than `least` do not count. Where there is no gap it is a full turn.
+    """
+    n = ordered.shape[0]
+    n_gaps, last = 0, 0
+    for i in range(n):
+        gap = ordered[(i + 1) % n] - ordered[i] + (2.0 * math.pi if i == n - 1 else 0.0)
+        if gap > max_gap:
+            n_gaps += 1
+            last = i
+    if n_gaps == 0:
+        spans[0, 0], spans[0, 1] = 0.0, 2.0 * math.pi
+        return 1
+    found = 0
+    start = (last + 1) % n
+    for k in range(n):
+        i = (last + 1 + k) % n
+        gap = ordered[(i + 1) % n] - ordered[i] + (2.0 * math.pi if i == n - 1 else 0.0)
+        if gap > max_gap:
+            end = ordered[i] + (2.0 * math.pi if ordered[i] < ordered[start] else 0.0)
+            if end - ordered[start] > least and found < spans.shape[0]:
+                spans[found, 0], spans[found, 1] = ordered[start], end
+                found += 1
+            start = (i + 1) % n
+    return found
+
+
+@njit(cache=True, nogil=True)
+def in_cells(theta, r, n_cells):
+    """Mean angle and radius of cells that hold points, their counts, and what they hide."""
+    count = np.zeros(n_cells)
+    middle, mean = np.zeros(n_cells), np.zeros(n_cells)
+    squares = 0.0
+    for i in range(theta.shape[0]):
+        k = min(int(theta[i] * (n_cells / (2.0 * math.pi))), n_cells - 1)
+        count[k] += 1.0
+        middle[k] += theta[i]
+        mean[k] += r[i]
+        squares += r[i] * r[i]
+    n = 0
+    for k in range(n_cells):
+        if count[k] > 0.0:
+            middle[n], mean[n], count[n] = middle[k] / count[k], mean[k] / count[k], count[k]
+            squares -= count[n] * mean[n] * mean[n]
+            n += 1
+    return middle[:n], mean[:n], count[:n], max(squares, 0.0)
+
+
+@njit(cache=True, nogil=True)
+def choose_order(rest, n_points, within, aic, upper):
+    """Least order by Akaike's criterion (corrected for few points), and what it leaves.
+
+    `rest` holds the terms and the values times the roots of the weights, and is lost;
+    `upper` becomes the triangle of `orthogonalise`. Writes the criterion of each order.
+    """
+    n, p = rest.shape[0], rest.shape[1] - 1
+    whole = 0.0
+    for i in range(n):
+        whole += rest[i, p] * rest[i, p]
+    orthogonalise(rest, upper)
+    best, best_left, explained = 0, 0.0, 0.0
+    for order in range(aic.shape[0]):
+        size = 2 * order + 1
+        for k in range(max(size - 2, 0), size):
+            explained += upper[k, p] * upper[k, p]
+        left = max(whole - explained + within, n_points * 1e-18)
+        q = 2.0 * order + 2.0
+        aic[order] = n_points * math.log(left / n_points) + 2.0 * q
+        aic[order] += 2.0 * q * (q + 1.0) / max(n_points - q - 1.0, 1.0)
+        if order == 0 or aic[order] < aic[best]:
+            best, best_left = order, left
+    return best, best_left
+
+
+@njit(cache=True, nogil=True)
+def inverted(upper, size):
+    """Inverse of a triangle's first rows and columns, from its last row up."""
+    inverse = np.zeros((size, size))
+    for i in range(size - 1, -1, -1):
+        for j in range(i, size):
+            total = 1.0 if i == j else 0.0
+            for k in range(i + 1, j + 1):
+                total -= upper[i, k] * inverse[k, j]
+            inverse[i, j] = total / upper[i, i]
+    return inverse
+
+
+@njit(cache=True, nogil=True)
+def curvature_variation(theta, coefficients, root):
+    """How much the curvature of a series varies at angles; see `SectionCurve`."""
+    values, variances = np.empty(theta.shape[0]), np.empty(theta.shape[0])
+    radius = curvature(theta, coefficients, root, values, variances)
+    total = mean = 0.0
+    for i in range(theta.shape[0]):
+        weight = 1.0 / (variances[i] + (0.05 / radius) ** 2)
+        total += weight
+        mean += weight * values[i]
+    mean /= total
+    spread = 0.0
+    for i in range(theta.shape[0]):
+        weight = 1.0 / (variances[i] + (0.05 / radius) ** 2) / total
+        spread += weight * ((values[i] - mean) ** 2 - variances[i])
+    return radius * math.sqrt(max(spread, 0.0))
+
+
+@njit(cache=True, nogil=True)
+def fit_series(theta, r, max_order, max_gap, limits):
+    """Fit a series to points in polar form, of the order that the criterion chooses.
+
+    `limits` are the points for each parameter, the shortest span that counts, the least arc
+    of all, the points from which on cells are taken, their number, and the rounds, Tukey's
+    reach and the reach in units of the noise by which strays are found. Returns the spans
+    (k, 2), how many points are no strays, the criterion of each order, the noise, the
+    coefficients and the root of their covariance; none of these for too short an arc.
+    """
+    per_parameter, least_span, least_arc, max_points, n_cells, n_rounds, tukey, outlying = limits
+    n = theta.shape[0]
+    spans = np.empty((n, 2))
+    spans = spans[: spans_of(np.sort(theta), max_gap, least_span, spans)]
+    arc = 0.0
+    for k in range(spans.shape[0]):
+        arc += spans[k, 1] - spans[k, 0]
+    if arc < least_arc:
+        return spans, 0, np.empty(0), math.nan, np.empty(0), np.empty((0, 0))
+    order = min(max_order, (n // per_parameter - 1) // 2)
+    weight, within = np.ones(n), 0.0
+    if n > max_points:
+        theta, r, weight, within = in_cells(theta, r, n_cells)
+    n, p = theta.shape[0], 2 * order + 1
+    basis = np.empty((n, p))
+    for i in range(n):
+        write_terms(theta[i], order, 0, basis[i])
+    residual, scale = find_strays(basis, r, weight, n_rounds, tukey)
+    # Weights that bend the tails of the noise would make it look smaller: all or nothing.
+    rest = np.empty((n, p + 1))
+    n_kept, n_points = 0, 0.0
+    for i in range(n):
+        if residual[i] < outlying * scale:
+            root = math.sqrt(weight[i])
+            for k in range(p):
+                rest[n_kept, k] = basis[i, k] * root
+            rest[n_kept, p] = r[i] * root
+            n_points += weight[i]
+            n_kept += 1
+    aic, upper = np.empty(order + 1), np.empty((p, p + 1))
+    chosen, left = choose_order(rest[:n_kept], n_points, within, aic, upper)
+    size = 2 * chosen + 1
+    noise = math.sqrt(left / max(n_points - size, 1.0))
+    inverse = inverted(upper, size)
+    coefficients = np.zeros(size)
+    for i in range(size):
+        for j in range(i, size):
+            coefficients[i] += inverse[i, j] * upper[j, p]
+    return spans, int(n_points), aic, noise, coefficients, noise * inverse
+
+
+@njit(cache=True, nogil=True)
+def clocks_of(spans, step):
+    """Angles from end to end of every span, no further than `step` apart."""
+    n = 0
+    for k in range(spans.shape[0]):
+        n += max(2, math.ceil((spans[k, 1] - spans[k, 0]) / step) + 1)
+    clocks = np.empty(n)
+    n = 0
+    for k in range(spans.shape[0]):
+        start, end = spans[k, 0], spans[k, 1]
+        m = max(2, math.ceil((end - start) / step) + 1)
+        for i in range(m):
+            clocks[n + i] = start + i * ((end - start) / (m - 1))
+        n += m
+    return clocks
+
+
+@njit(cache=True, nogil=True)
+def variations(theta, r, first, last, least_points, max_order, max_gap, limits, step, variation):
+    """Write how much the curvature varies around each section; nan where it carries no curve.
+
+    A section has the points from `first` to `last`.
+    """
+    for row in range(first.shape[0]):
+        a, b = first[row], last[row]
+        variation[row] = math.nan
+        if b - a >= least_points:
+            spans, _, _, _, coefficients, root = fit_series(
+                theta[a:b], r[a:b], max_order, max_gap, limits
+            )
+            if coefficients.shape[0]:
+                clocks = clocks_of(spans, step)
+                variation[row] = curvature_variation(clocks, coefficients, root)

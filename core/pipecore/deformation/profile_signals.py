@@ -8,9 +8,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipecore.deformation.section_curve import fit_section
+from pipecore.deformation import section_curve
 from pipecore.geometry import Array
 from pipecore.types import Element, Profiles
+
+AT_ONCE = 200
+"""Profiles between two looks for a cancel: some hundredths of a second."""
 
 
 def curvature_variations(
@@ -32,7 +35,7 @@ def curvature_variations(
     width : float
         With which they were cut, metres.
     check : callable
-        Called before each profile; may raise to cancel.
+        Called now and then; may raise to cancel.
 
     Returns
     -------
@@ -51,9 +54,8 @@ def curvature_variations(
     rho = rho + (element.radius_at(middle) - element.radius_at(chainage[order]))
     first = np.searchsorted(index, profiles.profile_index, side="left")
     last = np.searchsorted(index, profiles.profile_index, side="right")
-    for row, (a, b) in enumerate(zip(first, last, strict=True)):
+    for start in range(0, len(variation), AT_ONCE):
         check()
-        curve = fit_section(clock[a:b], rho[a:b])
-        if curve:
-            variation[row] = curve.curvature_variation
+        rows = slice(start, start + AT_ONCE)
+        variation[rows] = section_curve.curvature_variations(clock, rho, first[rows], last[rows])
     return variation

@@ -11,7 +11,7 @@ negative where the section is re-entrant, and more on a dent's shoulders.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pipecore._kernels import series as kernels
 from pipecore.ellipses.nonlinear import NoFit
@@ -32,6 +32,10 @@ MAX_POINTS, N_CELLS = 1440, 720
 """More points are taken together in cells of half a degree: no wave is that short."""
 
 STEP = np.deg2rad(2.0)
+LIMITS = (
+    POINTS_PER_PARAMETER, STEP, MIN_ARC, MAX_POINTS, N_CELLS, N_ROUNDS, TUKEY, OUTLYING,
+)  # fmt: skip
+"""As the kernels take them. A lone point between two holes is no arc: it takes a step."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,12 +139,7 @@ class SectionCurve:
         weighted by how well it is known there, less what the noise alone makes of it.
         """
         theta = np.concatenate(self.clocks())
-        value, variance = np.empty((2, len(theta)))
-        radius = float(kernels.curvature(theta, self.coefficients, self.root, value, variance))
-        weight = 1.0 / (variance + (0.05 / radius) ** 2)
-        weight /= weight.sum()
-        spread = float(weight @ (value - weight @ value) ** 2 - weight @ variance)
-        return radius * float(np.sqrt(max(spread, 0.0)))
+        return float(kernels.curvature_variation(theta, self.coefficients, self.root))
 
 
 def fit_section(
@@ -173,74 +172,41 @@ def fit_section(
     n = len(theta)
     if n < MIN_POINTS:
         return NoFit(f"only {n} points, {MIN_POINTS} are needed")
-    spans = _spans(theta, max_gap)
-    arc = sum(end - start for start, end in spans)
-    if arc < MIN_ARC:
+    spans, n_points, aic, noise, coefficients, root = kernels.fit_series(
+        theta, r, max_order, max_gap, LIMITS
+    )
+    if len(coefficients) == 0:
+        arc = float((spans[:, 1] - spans[:, 0]).sum())
         return NoFit(f"{np.rad2deg(arc):.0f}° of arc, {np.rad2deg(MIN_ARC):.0f}° are needed")
-    order = min(max_order, (n // POINTS_PER_PARAMETER - 1) // 2)
-    if n > MAX_POINTS:
-        theta, r, weight, within = _in_cells(theta, r)
-    else:
-        weight, within = np.ones(n), 0.0
-
-    basis = _basis(theta, order)
-    residual, scale = kernels.find_strays(basis, r, weight, N_ROUNDS, TUKEY)
-    # Weights that bend the tails of the noise would make it look smaller: all or nothing.
-    inside = residual < OUTLYING * scale
-    theta, r, weight = theta[inside], r[inside], weight[inside]
-    return _by_criterion(basis[inside], r, weight, within, spans)
-
-
-def _by_criterion(
-    basis: Array,
-    r: Array,
-    weight: Array,
-    within: float,
-    spans: tuple[tuple[float, float], ...],
-) -> SectionCurve:
-    """The order with the least criterion: all of them from one orthogonal decomposition."""
-    root, n = np.sqrt(weight), int(np.sum(weight))
-    upper, parts = _orthogonalise(basis * root[:, None], r * root)
-    max_order = (basis.shape[1] - 1) // 2
-    # Sum of squares that is left with the first 2k + 1 terms.
-    left = float(np.sum((r * root) ** 2)) - np.cumsum(parts**2)[::2] + within
-    left = np.maximum(left, n * 1e-18)
-    p = 2.0 * np.arange(max_order + 1) + 2.0  # the noise is one more
-    aic = n * np.log(left / n) + 2 * p + 2 * p * (p + 1) / np.maximum(n - p - 1, 1)
-    order = int(np.argmin(aic))
-    size = 2 * order + 1
-    noise = float(np.sqrt(left[order] / max(n - size, 1)))
-    inverse = _inverted(upper[:size, :size])
     return SectionCurve(
-        coefficients=inverse @ parts[:size],
-        root=noise * inverse,
-        order=order,
+        coefficients=coefficients,
+        root=root,
+        order=len(coefficients) // 2,
         aic_by_order=aic,
         noise=noise,
-        spans=spans,
-        n_points=n,
+        spans=tuple((float(a), float(b)) for a, b in spans),
+        n_points=int(n_points),
     )
 
 
-def _orthogonalise(a: Array, b: Array) -> tuple[Array, Array]:
-    """Triangle R of a = Q R, and Qᵀ b: modified Gram-Schmidt, stable with b taken along.
+def curvature_variations(
+    clock: Array, rho: Array, first: NDArray[np.intp], last: NDArray[np.intp]
+) -> Array:
+    """`SectionCurve.curvature_variation` of many sections, nan where points carry no curve.
 
-    The library's routines start threads even for so few columns, and wait for them longer
-    than they compute.
+    Parameters
+    ----------
+    clock, rho : ndarray, shape (n,)
+        As for `fit_section`, all finite.
+    first, last : ndarray of int, shape (m,)
+        The points of each section.
     """
-    upper = np.empty((a.shape[1], a.shape[1] + 1))
-    kernels.orthogonalise(np.column_stack([a, b]), upper)
-    return upper[:, :-1], upper[:, -1]
-
-
-def _inverted(upper: Array) -> Array:
-    """Inverse of a triangle, from its last row up."""
-    inverse = np.zeros_like(upper)
-    for i in range(len(upper) - 1, -1, -1):
-        inverse[i] = -upper[i, i + 1 :] @ inverse[i + 1 :]
-        inverse[i, i] += 1.0
-        inverse[i] /= upper[i, i]
-    return inverse
+    variation = np.empty(len(first))
+    kernels.variations(
+        np.mod(clock, 2 * np.pi), np.ascontiguousarray(rho), first, last,
+        MIN_POINTS, MAX_ORDER, MAX_GAP, LIMITS, STEP, variation,
+    )  # fmt: skip
+    return variation
 
 
 def _basis(theta: Array, order: int, derivative: int = 0) -> Array:
@@ -252,29 +218,3 @@ def _basis(theta: Array, order: int, derivative: int = 0) -> Array:
     terms[..., 1::2] = k**derivative * np.cos(phase)
     terms[..., 2::2] = k**derivative * np.sin(phase)
     return terms
-
-
-def _spans(theta: Array, max_gap: float) -> tuple[tuple[float, float], ...]:
-    """Arcs between gaps wider than `max_gap`."""
-    ordered = np.sort(theta)
-    gap = np.diff(ordered, append=ordered[0] + 2 * np.pi)
-    last = np.flatnonzero(gap > max_gap)
-    if len(last) == 0:
-        return ((0.0, 2 * np.pi),)
-    first = np.roll((last + 1) % len(ordered), 1)
-    starts, ends = ordered[first], ordered[last]
-    ends = np.where(ends < starts, ends + 2 * np.pi, ends)
-    # A lone point between two holes is no arc.
-    return tuple((float(a), float(b)) for a, b in zip(starts, ends, strict=True) if b - a > STEP)
-
-
-def _in_cells(theta: Array, r: Array) -> tuple[Array, Array, Array, float]:
-    """Mean angle and radius of cells of half a degree, their counts, and what they hide."""
-    index = np.minimum((theta * (N_CELLS / (2 * np.pi))).astype(np.intp), N_CELLS - 1)
-    count = np.bincount(index, minlength=N_CELLS)
-    some = count > 0
-    n = count[some].astype(np.float64)
-    middle = np.bincount(index, theta, minlength=N_CELLS)[some] / n
-    mean = np.bincount(index, r, minlength=N_CELLS)[some] / n
-    hidden = float(np.sum(r**2) - np.sum(n * mean**2))
-    return middle, mean, n, max(hidden, 0.0)

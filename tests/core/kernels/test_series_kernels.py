@@ -83,3 +83,79 @@ def test_that_the_curvature_of_a_circle_and_of_an_ellipse_are_theirs(rng):
     assert_allclose(values, expected, rtol=1e-6)
     spread = np.linalg.norm(terms_of(theta, order, 2) @ root, axis=1) / r**2
     assert_allclose(np.sqrt(variances), spread, rtol=1e-6)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.5, 4.0])
+def test_that_spans_lie_between_wide_gaps_and_go_on_over_noon(rng, width):
+    # One span from 5 to 7 (over noon), one of `width` from 2 on, and a lone point.
+    theta = np.concatenate([np.arange(5, 7.001, 0.1), np.arange(2, 2.001 + width, 0.1), [1.2]])
+    theta = np.sort(np.mod(theta, 2 * np.pi))
+    spans = np.empty((9, 2))
+    spans = spans[: series.spans_of(theta, 0.3, 0.05, spans)]
+    if width == 4.0:  # up to 6, where the other has begun
+        assert_allclose(spans, [[2.0, 7.0]])
+    elif width == 0.0:
+        assert_allclose(spans, [[5.0, 7.0]])
+    else:
+        assert_allclose(spans[np.argsort(spans[:, 0])], [[2.0, 2.5], [5.0, 7.0]])
+    assert series.spans_of(np.arange(0.1, 2 * np.pi, 0.1), 0.3, 0.05, np.empty((9, 2))) == 1
+
+
+def test_that_cells_hold_means_and_what_they_hide(rng):
+    theta, r = rng.uniform(0, 2 * np.pi, 200), rng.normal(size=200)
+    middle, mean, count, hidden = series.in_cells(theta, r, 16)
+    cell = (theta / (2 * np.pi) * 16).astype(int)
+    for k, own in enumerate(np.unique(cell)):
+        assert count[k] == (cell == own).sum()
+        assert middle[k] == pytest.approx(theta[cell == own].mean())
+        assert mean[k] == pytest.approx(r[cell == own].mean())
+    assert (count * mean**2).sum() + hidden == pytest.approx((r**2).sum())
+
+
+def test_that_the_order_is_chosen_by_what_least_squares_leave(rng):
+    n, order = 80, 4
+    a, b = terms_of(rng.uniform(0, 2 * np.pi, n), order), rng.normal(size=n)
+    b += 3.0 * a[:, 3] - 2.0 * a[:, 4]
+    aic, upper = np.empty(order + 1), np.empty((2 * order + 1, 2 * order + 2))
+    best, left = series.choose_order(np.column_stack([a, b]), float(n), 0.5, aic, upper)
+    expected = []
+    for k in range(order + 1):
+        part = a[:, : 2 * k + 1]
+        rss = ((b - part @ np.linalg.lstsq(part, b, rcond=None)[0]) ** 2).sum() + 0.5
+        p = 2 * k + 2
+        expected.append(n * np.log(rss / n) + 2 * p + 2 * p * (p + 1) / (n - p - 1))
+        if k == best:
+            assert left == pytest.approx(rss)
+    assert_allclose(aic, expected)
+    assert best == np.argmin(expected) >= 2
+    triangle = upper[:5, :5]
+    assert_allclose(series.inverted(upper, 5) @ triangle, np.eye(5), atol=1e-12)
+
+
+def test_that_many_sections_vary_as_each_alone(rng):
+    parts = []
+    for n, oval in ((200, 0.0), (300, 0.05), (8, 0.0), (400, 0.0)):
+        theta = rng.uniform(0, 2 * np.pi, n)
+        parts.append((theta, 0.1 * (1 + oval * np.cos(2 * theta)) + 2e-4 * rng.normal(size=n)))
+    parts[3] = tuple(x[np.abs(parts[3][0] - 3) < 0.3] for x in parts[3])  # too short an arc
+    last = np.cumsum([len(t) for t, _ in parts])
+    first = last - [len(t) for t, _ in parts]
+    theta, r = (np.concatenate(x) for x in zip(*parts, strict=True))
+    limits = (3, 0.03, 1.0, 250, 100, 5, 4.7, 4.0)
+    variation = np.empty(4)
+    series.variations(theta, r, first, last, 12, 6, 0.4, limits, 0.03, variation)
+    for k in (0, 1):
+        spans, _, _, _, coefficients, root = series.fit_series(*parts[k], 6, 0.4, limits)
+        clocks = np.concatenate(
+            [np.linspace(a, b, int(np.ceil((b - a) / 0.03)) + 1) for a, b in spans]
+        )
+        assert_allclose(series.clocks_of(spans, 0.03), clocks)
+        values, variances = np.empty((2, len(clocks)))
+        radius = series.curvature(clocks, coefficients, root, values, variances)
+        weight = 1 / (variances + (0.05 / radius) ** 2)
+        mean = np.average(values, weights=weight)
+        spread = np.average((values - mean) ** 2 - variances, weights=weight)
+        assert variation[k] == pytest.approx(radius * np.sqrt(max(spread, 0)), abs=1e-12)
+    assert variation[0] < 0.03
+    assert variation[1] > 0.08
+    assert np.isnan(variation[2:]).all()
