@@ -247,8 +247,7 @@ def fit_surface(
     if n < 3 * p:
         return None
     inverse = np.linalg.pinv(information)
-    if not is_rough:
-        kernels.move(kind, numbers, inverse @ _beam_pull(kind, numbers, xyz, reach, beam, p))
+    kernels.move(kind, numbers, inverse @ _beam_pull(kind, numbers, xyz, reach, beam, p))
     return SurfaceFit(model.from_numbers(numbers), inverse @ scatter @ inverse, sigma, n)
 
 
