@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipecore._kernels import maps as kernels
 from pipecore.geometry import Array
 from pipecore.types import Element
 
@@ -94,15 +95,9 @@ class Grid:
 
     def interpolate(self, table: Array, chainage: Array, clock: Array) -> Array:
         """Values of a cell table at points, bilinear, round the clock."""
-        row = np.clip(chainage / self.row_size - 0.5, 0, self.n_rows - 1)
-        column = clock / self.column_angle - 0.5
-        r0 = np.minimum(row.astype(np.intp), self.n_rows - 2)
-        c0 = np.floor(column).astype(np.intp)
-        fr, fc = row - r0, column - c0
-        left, right = np.mod(c0, self.n_columns), np.mod(c0 + 1, self.n_columns)
-        near = table[r0, left] * (1 - fc) + table[r0, right] * fc
-        far = table[r0 + 1, left] * (1 - fc) + table[r0 + 1, right] * fc
-        return np.asarray(near * (1 - fr) + far * fr)
+        values = np.empty(len(chainage))
+        kernels.interpolate(table, self.row_size, self.column_angle, chainage, clock, values)
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,13 +194,6 @@ def local_noise(grid: Grid, cell: Cells, height: Array) -> Array:
 
 def group_median(group: Cells, values: Array, n_groups: int) -> tuple[Array, Array]:
     """Median and count of `values` per group, shapes (n_groups,); nan where empty."""
-    order = np.lexsort((values, group))
-    counts = np.bincount(group, minlength=n_groups)
-    first = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    some = counts > 0
-    result = np.full(n_groups, np.nan)
-    low = first[some] + (counts[some] - 1) // 2
-    high = first[some] + counts[some] // 2
-    ordered = values[order]
-    result[some] = (ordered[low] + ordered[high]) / 2
-    return result, counts.astype(np.float64)
+    medians, counts = np.empty(n_groups), np.empty(n_groups)
+    kernels.group_medians(group, values, medians, counts)
+    return medians, counts

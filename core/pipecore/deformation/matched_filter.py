@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from pipecore._kernels.maps import strongest
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
@@ -77,10 +78,10 @@ def find_candidates(
     found: list[Candidate] = []
     free = allowed.copy()
     while layers:
-        best = max(layers, key=lambda layer: float(np.max(np.abs(layer[0]) * free)))
-        z, height, size, inflation = best
-        peak = int(np.argmax(np.abs(z) * free))
-        row, column = divmod(peak, grid.n_columns)
+        peaks = [strongest(z, free) for z, *_ in layers]
+        best = max(range(len(layers)), key=lambda k: peaks[k][0])
+        z, height, size, inflation = layers[best]
+        row, column = divmod(peaks[best][1], grid.n_columns)
         if not free[row, column] or abs(z[row, column]) < threshold:
             break
         found.append(

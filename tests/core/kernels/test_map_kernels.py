@@ -1,0 +1,41 @@
+"""Cells of a deviation map, against numpy and scipy."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.interpolate import RegularGridInterpolator
+
+from pipecore._kernels import maps
+
+pytestmark = pytest.mark.kernels
+
+
+def test_that_medians_of_groups_are_numpys(rng):
+    group, values = rng.integers(0, 12, 90), rng.normal(size=90)
+    group[group == 7] = 8
+    medians, counts = np.empty((2, 12))
+    maps.group_medians(group, values, medians, counts)
+    assert_array_equal(counts, np.bincount(group, minlength=12))
+    for k in range(12):
+        own = values[group == k]
+        assert_array_equal(medians[k], np.median(own) if len(own) else np.nan)
+
+
+def test_that_values_lie_between_those_of_cells_round_the_clock(rng):
+    table, angle = rng.normal(size=(7, 9)), 2 * np.pi / 9
+    chainage, clock = rng.uniform(-0.2, 1.6, 80), rng.uniform(0, 2 * np.pi, 80)
+    values = np.empty(80)
+    maps.interpolate(table, 0.2, angle, chainage, clock, values)
+    whole = np.concatenate([table[:, -1:], table, table[:, :1]], axis=1)
+    places = (np.arange(7) + 0.5) * 0.2, (np.arange(-1, 10) + 0.5) * angle
+    held = np.clip(chainage, 0.1, 1.3)
+    assert_allclose(values, RegularGridInterpolator(places, whole)(np.stack([held, clock], axis=1)))
+
+
+def test_that_the_strongest_of_the_free_cells_is_found(rng):
+    z, free = rng.normal(size=(8, 11)), rng.random((8, 11)) < 0.5
+    most, place = maps.strongest(z, free)
+    assert most == np.abs(z[free]).max()
+    assert free.ravel()[place]
+    assert abs(z.ravel()[place]) == most
+    assert maps.strongest(z, np.zeros_like(free)) == (0.0, 0)
