@@ -21,8 +21,8 @@ TUKEY = 4.685
 NARROWING = 0.7
 """The scale shrinks by no more than this in one iteration: the fit may still be far off."""
 LEAST_SCALE = 1e-5
-SETTLED = 0.02
-"""A fit ends when the scale changes by no more than this share, and the surface hardly."""
+CONVERGED, SETTLED = 1e-6, 0.02
+"""A fit ends when no point's distance changes by more than this, nor the scale by this share."""
 WORST_CONDITION = 1e10
 FACING = 0.3
 """Least cosine to the beam of points that tell the noise along it."""
@@ -232,11 +232,10 @@ def solve_step(normal, right, step):
 
 
 @njit(cache=True, nogil=True)
-def fit_robustly(kind, surface, xyz, scale, n_iterations, converged):
+def fit_robustly(kind, surface, xyz, scale, n_iterations):
     """Move a surface onto points by Gauss-Newton with Tukey's weights, in place.
 
-    It ends when no point's distance changes by more than `converged`, metres. Returns the
-    last scale; nan where the points do not carry the surface.
+    Returns the last scale; nan where the points do not carry the surface.
     """
     p = n_parameters(kind)
     normal, right, step = np.empty((p, p)), np.empty(p), np.empty(p)
@@ -254,7 +253,7 @@ def fit_robustly(kind, surface, xyz, scale, n_iterations, converged):
         shown = spread_within(residuals, reach)
         change = abs(shown - scale)
         scale = min(scale, max(shown, NARROWING * scale, LEAST_SCALE))
-        if change < SETTLED * scale and moves_less(kind, before, xyz, step, converged):
+        if change < SETTLED * scale and moves_less(kind, before, xyz, step, CONVERGED):
             break
     return scale
 

@@ -19,8 +19,6 @@ Array = NDArray[np.float64]
 
 NORMAL_STEPS = np.array([-2.334, -0.742, 0.742, 2.334]), np.array([0.0459, 0.4541, 0.4541, 0.0459])
 """Nodes and weights of Gauss and Hermite's quadrature for the standard normal distribution."""
-CONVERGED, NEARLY = 1e-6, 1e-4
-"""A fit ends when no point's distance changes by more than this, metres; a rough fit earlier."""
 ONE_SIDED = 0.55
 """Length of the mean of a surface's normals from which on it is seen from one side (200°)."""
 
@@ -214,7 +212,7 @@ def robust_sigma(residuals: Array) -> float:
 
 
 def fit_surface(
-    model: Model, xyz: Array, scale: float, n_iterations: int = 30, *, is_rough: bool = False
+    model: Model, xyz: Array, scale: float, n_iterations: int = 30
 ) -> SurfaceFit[Model] | None:
     """Fit a surface to points by Gauss-Newton with Tukey's weights.
 
@@ -226,8 +224,6 @@ def fit_surface(
     scale : float
         First guess of the points' standard deviation; it shrinks to what they show.
     n_iterations : int
-    is_rough : bool
-        Whether a tenth of a millimetre is near enough, as where another fit follows.
 
     Returns
     -------
@@ -235,8 +231,7 @@ def fit_surface(
         None where the points do not carry the surface.
     """
     kind, numbers = model.kind, model.numbers()
-    converged = NEARLY if is_rough else CONVERGED
-    scale = kernels.fit_robustly(kind, numbers, xyz, scale, n_iterations, converged)
+    scale = kernels.fit_robustly(kind, numbers, xyz, scale, n_iterations)
     if not scale > 0:
         return None
     reach = kernels.TUKEY * scale
