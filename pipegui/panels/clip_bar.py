@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QToolButton, QWidget
 
 from pipegui import describe, theme
 from pipegui.document import Box
@@ -13,6 +14,8 @@ from pipegui.texts import mark, tr
 from pipegui.view_state import ClipState
 
 STEP = 0.05
+FIELD_FRAME, BUTTON_FRAME, ICON_FRAME = 12, 18, 8
+"""Pixels around the text of a field or a button, and around an icon."""
 
 FIELD_NAMES = (mark("Clip box, lower {axis}"), mark("Clip box, upper {axis}"))
 FIELD_TIPS = (mark("Lower end along {axis}, metres"), mark("Upper end along {axis}, metres"))
@@ -34,6 +37,7 @@ class ClipBar(QWidget):
         self._origin = np.zeros(3)
         self._box: Box | None = None
         row = QHBoxLayout(self)
+        row.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)
         row.setContentsMargins(theme.SPACING, 2, theme.SPACING, 2)
         row.setSpacing(theme.SPACING // 2)
         self._names = [QLabel() for _ in range(3)]
@@ -46,20 +50,32 @@ class ClipBar(QWidget):
                 field.setRange(-1e9, 1e9)
                 field.setSingleStep(STEP)
                 field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
-                field.setMinimumWidth(7 * theme.SPACING)
                 axis = len(self.ends) - 1
                 field.valueChanged.connect(
                     lambda value, axis=axis, side=side: self._tell(axis, side, value)
                 )
                 row.addWidget(field, 1)
-        self.whole = self._button(tr("All"), self.whole_requested)
-        self.selection = self._button(tr("Selection"), self.selection_requested)
-        self.invert = self._button(tr("Outside"), self.inverted)
+        self._icons: dict[QToolButton, str] = {}
+        self.whole = self._button(
+            tr("All"), tr("Put the box around the whole scan"), "select-all", self.whole_requested
+        )
+        self.selection = self._button(
+            tr("Selection"),
+            tr("Put the box around the selection"),
+            "crop",
+            self.selection_requested,
+        )
+        self.invert = self._button(
+            tr("Outside"),
+            tr("Show what is outside the box instead of what is in it"),
+            "select-inverse",
+            self.inverted,
+        )
         self.invert.setCheckable(True)
-        self.invert.setToolTip(tr("Show what is outside the box instead of what is in it"))
-        self.close_ = self._button(tr("Off"), self.closed)
-        for button in (self.whole, self.selection, self.invert, self.close_):
+        self.close_ = self._button(tr("Off"), tr("Stop clipping"), "close", self.closed)
+        for button in self._icons:
             row.addWidget(button)
+        self._paint_icons()
         self.hide()
 
     def apply(self, state: ClipState) -> None:
@@ -79,10 +95,56 @@ class ClipBar(QWidget):
                     field.setAccessibleName(tr(FIELD_NAMES[side]).format(axis=name))
                     field.setToolTip(tr(FIELD_TIPS[side]).format(axis=name))
                     field.setValue(local[axis] + float(self._origin[axis]))
+                    text = field.fontMetrics().horizontalAdvance(f"{field.value():.2f}")
+                    field.setMinimumWidth(text + FIELD_FRAME)
+        self._fit()
 
-    def _button(self, text: str, signal: Signal) -> QToolButton:
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Show icons where there is no room for words."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Follow light and dark."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.PaletteChange:
+            self._paint_icons()
+
+    def _paint_icons(self) -> None:
+        for button, icon in self._icons.items():
+            button.setIcon(theme.icon(icon))
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """With icons: words must not make the window wider."""
+        return QSize(self._needed(words=False), super().minimumSizeHint().height())
+
+    def _needed(self, *, words: bool) -> int:
+        """Width at which the numbers are whole, beside words or icons."""
+        fields = [field.minimumWidth() for pair in self.ends for field in pair]
+        names = [name.sizeHint().width() for name in self._names]
+        buttons = [
+            b.fontMetrics().horizontalAdvance(b.text()) + BUTTON_FRAME
+            if words
+            else b.iconSize().width() + ICON_FRAME
+            for b in self._icons
+        ]
+        between = self.layout().spacing() * self.layout().count() + 2 * theme.SPACING
+        return sum(fields) + sum(names) + sum(buttons) + between
+
+    def _fit(self) -> None:
+        """Choose words or icons for the buttons."""
+        style = Qt.ToolButtonStyle.ToolButtonTextOnly
+        if self.width() < self._needed(words=True):
+            style = Qt.ToolButtonStyle.ToolButtonIconOnly
+        for button in self._icons:
+            button.setToolButtonStyle(style)
+
+    def _button(self, text: str, tip: str, icon: str, signal: Signal) -> QToolButton:
         button = QToolButton()
         button.setText(text)
+        button.setToolTip(tip)
+        button.setAccessibleName(tip)
+        self._icons[button] = icon
         button.setAutoRaise(True)
         button.clicked.connect(signal)
         return button

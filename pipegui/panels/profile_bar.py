@@ -39,7 +39,7 @@ class ProfileBar(QWidget):
         self.place = QLabel()
         row.addWidget(self.place)
         self.all = QToolButton()
-        self.all.setText(tr("All"))
+        self.all.setText(tr("All profiles"))
         self.all.setToolTip(tr("Show all profiles of the stack"))
         self.all.setCheckable(True)
         self.all.clicked.connect(lambda: self.chosen.emit(None))

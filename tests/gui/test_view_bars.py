@@ -7,8 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 
 from pipecore.types import PointCloud
+from pipegui.document import Box
+from pipegui.panels.clip_bar import ClipBar
+from pipegui.view_state import ClipState
 from tests.factories import make_cloud
 
 LEFT = Qt.MouseButton.LeftButton
@@ -66,6 +70,23 @@ def test_that_the_bar_and_the_menu_show_what_is_outside_of_the_box(detected, qtb
     qtbot.keyClick(detected, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
     assert not detected.document.view.clip_box.is_inverted
     assert not bar.invert.isChecked()
+
+
+@pytest.mark.parametrize("width", [640, 1100])
+def test_that_the_numbers_of_the_clip_box_are_whole_in_a_narrow_bar_too(qtbot, width):
+    bar = ClipBar()
+    qtbot.addWidget(bar)
+    cloud = PointCloud(np.array([432_100.0, 6_201_870.0, 110.0]), np.zeros((1, 3), np.float32))
+    bar.resize(width, 40)
+    bar.apply(ClipState(Box((0.91, 0.32, 0.42), (1.34, 0.66, 0.78)), cloud, has_selection=True))
+    QApplication.processEvents()
+    assert (bar.width(), bar.minimumSizeHint().width() < width) == (width, True)
+    for field in (field for pair in bar.ends for field in pair):
+        text = field.fontMetrics().horizontalAdvance(field.text())
+        assert text <= field.lineEdit().contentsRect().width() - 4
+    is_worded = bar.invert.toolButtonStyle() is Qt.ToolButtonStyle.ToolButtonTextOnly
+    assert is_worded == (width > 1000)
+    assert bar.close_.geometry().right() < width
 
 
 @pytest.fixture
