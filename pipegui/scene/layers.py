@@ -1,5 +1,6 @@
 """The points of the 3D view, in whichever of three layers suits the moment."""
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -52,6 +53,8 @@ class Layers(QObject):
         self._details.found.connect(self._show_close_up)
         self._subset.found.connect(self._show_subset)
         canvas.settled.connect(self._look_closer)
+        self._search: Callable[[], NDArray[np.int32] | None] | None = None
+        canvas.drawn.connect(self._begin_search)
         for layer in (self.whole, self.close_up, self.preview):
             canvas.drawn.connect(layer.learn)
 
@@ -90,12 +93,19 @@ class Layers(QObject):
     def _choose(self, cloud: PointCloud, box: Box | None) -> None:
         """Show the points that are to be seen; of a large cloud, a part until all are known."""
         self._subset.stop()
+        self._search = None
         is_whole = box is None and not self._state.view.hidden_elements
         if is_whole or len(cloud) <= AT_ONCE:
             self.whole.set_points(cloud, rows_of(self._visible(box)), self._colour)
             return
         self.whole.set_points(cloud, self._sample(box), self._colour)
-        self._subset.look(lambda _: rows_of(self._visible(box)))
+        self._search = lambda: rows_of(self._visible(box))
+
+    def _begin_search(self, _: float) -> None:
+        """Look for all points that are to be seen, once a part of them is on the screen."""
+        if self._search is not None:
+            search, self._search = self._search, None
+            self._subset.look(lambda _: search())
 
     def _show_subset(self, rows: NDArray[np.int32]) -> None:
         if self._state.cloud is not None:
@@ -143,6 +153,7 @@ class Layers(QObject):
     def forget(self) -> None:
         """Let go of the cloud."""
         self._end_close_up()
+        self._search = None
         self._details.close()
         self._subset.close()
         self._state = SceneState()

@@ -5,6 +5,7 @@ Only what is drawn is copied, so that a cloud of any size costs no more than is 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +117,7 @@ class PointLayer:
         is_new = cloud is not self._cloud
         self.clear_actors()
         if is_new:
-            self.spacing = estimate_spacing(cloud.xyz)
+            self.spacing = _spacing_of(cloud)
         self._cloud, self._colour = cloud, colour
         self._visible = None if visible is None else visible.astype(np.int32, copy=False)
         self._spread = Spread(len(cloud) if self._visible is None else len(self._visible))
@@ -251,6 +252,12 @@ def set_planes(actor: vtkActor, box: Box | None) -> None:
     planes = mapper.GetClippingPlanes()
     for i in range(planes.GetNumberOfItems()):
         planes.GetItem(i).SetOrigin(box.low if i < 3 else box.high)
+
+
+@lru_cache(maxsize=4)
+def _spacing_of(cloud: PointCloud) -> float:
+    """Three layers show the same cloud."""
+    return estimate_spacing(cloud.xyz)
 
 
 def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:

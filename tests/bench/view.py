@@ -138,11 +138,15 @@ def measure(n: int) -> dict[str, float]:
         times.append(1000 * (time.perf_counter() - start))
     found["pick"] = float(np.median(times))
     found["points picked from"] = sum(len(part) for part in scene.points.parts)
+    computing = time.thread_time()
     found["recolour"] = until_drawn(lambda: show(colour_by=ColourBy.HEIGHT))
+    found["recolour, CPU"] = 1000 * (time.thread_time() - computing)
     rest()
     low, high = cloud.xyz[:100_000].min(axis=0), cloud.xyz[:100_000].max(axis=0)
     box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    computing = time.thread_time()
     found["clip"] = until_drawn(lambda: show(colour_by=ColourBy.HEIGHT, clip_box=box))
+    found["clip, CPU"] = 1000 * (time.thread_time() - computing)
     rest()
     pixels, _ = scene.canvas.projection().to_screen(clipping.handles(box))
     at = QPointF(*pixels[clipping.MIDDLE])
@@ -178,7 +182,8 @@ def _section(rows: list[dict[str, float]], sizes: list[float]) -> str:
         f"| {million:g} | {r['first picture']:.0f} | {r['move, median']:.0f} "
         f"| {r['move, worst']:.0f} | {r['move, CPU']:.0f} | {r['points moving'] / 1e3:.0f} k "
         f"| {r['points at rest'] / 1e6:.1f} M | {r['pick']:.1f} | {r['recolour']:.0f} "
-        f"| {r['clip']:.0f} | {r['drag box, worst']:.0f} | {r['memory, cloud']:.1f} "
+        f"({r['recolour, CPU']:.0f}) | {r['clip']:.0f} ({r['clip, CPU']:.0f}) "
+        f"| {r['drag box, worst']:.0f} | {r['memory, cloud']:.1f} "
         f"| {r['memory, all']:.1f} |"
         for million, r in zip(sizes, rows, strict=True)
     ]
@@ -191,7 +196,8 @@ the end; a view of {SIZE[0]} × {SIZE[1]} pixels.
 Random points on pipes, with intensity, colour and class. Times are from what the user does
 to the picture that shows it, in milliseconds; the worst is that of {N_MOVES} moves in a row
 after {N_MOVES // 4} that find out how fast the machine draws. CPU is the time of all cores,
-which does not count what else the machine does. Memory is in bytes a
+which does not count what else the machine does; in brackets, that of the window's thread.
+Recolouring and clipping draw a part of the points first. Memory is in bytes a
 point: the cloud's own, and with all that the view adds to it, resident after a rest; without
 a graphics card, what that would hold is among it.
 
