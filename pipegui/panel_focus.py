@@ -2,8 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QApplication, QWidget
 
 if TYPE_CHECKING:
     from pipegui.main_window import MainWindow
@@ -31,3 +31,22 @@ def _first_input(panel: QWidget) -> QWidget | None:
         if takes_it and widget.isVisibleTo(panel) and widget.isEnabled():
             return widget
     return None
+
+
+class FocusInSight(QObject):
+    """Brings a panel forward that lies behind another when Tab leads into it."""
+
+    def __init__(self, window: "MainWindow") -> None:
+        super().__init__(window)
+        self._docks = window.panels.docks
+        app = QApplication.instance()
+        assert isinstance(app, QApplication)
+        app.focusChanged.connect(self._look)
+
+    def _look(self, _before: QWidget | None, now: QWidget | None) -> None:
+        if now is None:
+            return
+        for dock in self._docks.values():
+            is_behind = dock.isVisible() and dock.visibleRegion().isEmpty()
+            if is_behind and dock.isAncestorOf(now):
+                dock.raise_()

@@ -10,7 +10,7 @@ from pipegui import commands, cuts, describe, edit_commands, files, theme, view_
 from pipegui.document import Background, ProfileKey, Tool
 from pipegui.kept_choices import keep, keep_tab
 from pipegui.menus import VIEW_OPTIONS
-from pipegui.panel_focus import go_to_next_panel
+from pipegui.panel_focus import FocusInSight, go_to_next_panel
 from pipegui.presets import Presets
 from pipegui.texts import LANGUAGES, tr
 
@@ -103,6 +103,7 @@ def handlers(window: "MainWindow") -> Mapping[str, Callable[..., object]]:
 def connect_panels(window: "MainWindow") -> None:
     """Connect the panels and the tool bar."""
     do, panels = window.do, window.panels
+    FocusInSight(window)
     panels.welcome.open_requested.connect(window.menu_actions.open)
     panels.welcome.demo_requested.connect(window.menu_actions.open_demo)
     panels.tree.chosen.connect(window.choose_in_tree)

@@ -59,15 +59,18 @@ def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
 
 
 def _clear_away(app: QApplication, windows: Collection[int]) -> None:
-    """Close and delete what a test left open: the next one needs the keyboard for itself."""
+    """Close what a test left open: the next one needs the keyboard for itself.
+
+    Nothing is deleted: what holds on to it may still use it.
+    """
     while (popup := app.activePopupWidget()) is not None:
         popup.close()
     for widget in app.topLevelWidgets():
-        if shiboken6.isValid(widget) and shiboken6.getCppPointer(widget)[0] not in windows:
+        is_new = shiboken6.getCppPointer(widget)[0] not in windows
+        if is_new and widget.isVisible():
             if isinstance(widget, MainWindow):
                 widget.projects.discard()
             widget.close()
-            widget.deleteLater()
     _flush()
 
 

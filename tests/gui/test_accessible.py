@@ -7,6 +7,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QAbstractSlider,
     QAbstractSpinBox,
+    QApplication,
     QComboBox,
     QHeaderView,
     QLabel,
@@ -179,3 +180,14 @@ def test_that_after_a_click_on_its_tab_the_arrows_step_through_the_sections(whol
     assert tabs.currentWidget() is section
     assert section.title.text() != shown
     assert whole.document.selection.profile is not None
+
+
+def test_that_tab_never_leads_where_nothing_is_seen(detected, qtbot):
+    detected.panels.tree.view.setFocus()
+    passed = set()
+    for _ in range(60):
+        focused = QApplication.focusWidget()
+        qtbot.waitUntil(lambda w=focused: not w.visibleRegion().isEmpty() or w.height() == 0)
+        passed |= {name for name, d in detected.panels.docks.items() if d.isAncestorOf(focused)}
+        qtbot.keyClick(focused, Qt.Key.Key_Tab)
+    assert passed == set(detected.panels.docks)
