@@ -55,11 +55,12 @@ def axes_at(
     grid = CellGrid.build(points, radius)
     # Few of the points are looked at: they are not copied cell by cell.
     cells = np.searchsorted(grid.cell_keys, GridFrame.of(points, radius).keys(points[sample]))
+    lookup = grid.lookup
     axes, spreads = np.empty((len(sample), 3)), np.empty((len(sample), 3))
 
     def work(start: int, stop: int) -> None:
         neighbours.fit_local_axes(
-            points, normals, grid.order, *grid.lookup, radius, sample, cells, start, stop,
+            points, normals, grid.order, *lookup, radius, sample, cells, start, stop,
             axes, spreads,
         )  # fmt: skip
 

@@ -143,7 +143,7 @@ class VoxelCounter:
 
 @dataclass(frozen=True, eq=False)
 class CellGrid:
-    """Points sorted by cell, with a hash table from cell numbers to ranges of points."""
+    """Points sorted by cell."""
 
     edge: float
     order: NDArray[np.int64]
@@ -151,8 +151,6 @@ class CellGrid:
     cell_keys: NDArray[np.int64]
     """Number of each cell, ascending, shape (c,)."""
     cell_starts: NDArray[np.int64]
-    table_keys: NDArray[np.int64]
-    table_ids: NDArray[np.int32]
     n_y: int
     n_z: int
 
@@ -170,7 +168,7 @@ class CellGrid:
         del counter
         voxels.rename_voxels(cell, 0, len(cell), rank)
         order, starts = group_by_label(cell, len(keys))
-        return cls(edge, order, keys, starts, *table_of(keys), frame.n_y, frame.n_z)
+        return cls(edge, order, keys, starts, frame.n_y, frame.n_z)
 
     @property
     def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64], int, int]:
@@ -183,5 +181,9 @@ class CellGrid:
     ) -> tuple[
         NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], int, int
     ]:
-        """What the kernels in `pipecore._kernels.neighbours` need to find neighbours."""
-        return self.cell_keys, self.cell_starts, self.table_keys, self.table_ids, self.n_y, self.n_z
+        """What the kernels in `pipecore._kernels.neighbours` need to find neighbours.
+
+        Makes a hash table from the cells' numbers to their places: to be asked for once.
+        """
+        table = table_of(self.cell_keys)
+        return self.cell_keys, self.cell_starts, *table, self.n_y, self.n_z
