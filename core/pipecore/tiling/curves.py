@@ -7,6 +7,7 @@ curves share.
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,8 @@ BYTES_PER_POINT = 420
 """What cutting a thinned point into a profile and fitting its curve takes at the most."""
 SORTING = 0.3
 """Share of the time that sorting points by profile takes."""
+CUT_ARRAYS = "surface", "normals", "spacing"
+"""What the cutting of profiles looks at."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,11 @@ def leave_out_planes(
         progress.update("directions", 1.0)
         ids = store.open(f"cells-{k}")
         join(slab.surface[0], cells.plane[ids])
-        store.save(f"cut-{k}", np.flatnonzero(cells.is_cut[ids]).astype(np.int32))
+        rows = slab.surface[0] + np.flatnonzero(cells.is_cut[ids])
+        store.save(f"cut-{k}", rows.astype(np.int32))
+        # Every stack looks at these points, so that they are laid side by side.
+        for name in CUT_ARRAYS:
+            store.save(f"cut-{name}-{k}", store.open(name)[rows])
         store.remove(f"cells-{k}")
 
 
@@ -92,11 +99,10 @@ def cut_in_batches(
     begin, end = span
     middle = begin + SORTING * (end - begin)
     facts = Facts(tiled.surface.voxel, tiled.surface.noise)
-    firsts = tuple(slab.surface[0] for slab in tiled.slabs)
-    slabs = [(k, slab.surface, stack) for k, slab in enumerate(tiled.slabs)]
+    slabs = [(k, stack) for k in range(len(tiled.slabs))]
     sorted_slabs = engine.run(sort_slab, slabs, "profiles", progress, (begin, middle))
     batches = [
-        (k, begins, firsts, stack, settings, facts)
+        (k, begins, stack, settings, facts)
         for k, begins in enumerate(_batches(sorted_slabs, max(1, batch_bytes // BYTES_PER_POINT)))
     ]
     tables = engine.run(ellipses_of_batch, batches, "profiles", progress, (middle, end))
@@ -151,15 +157,12 @@ def sum_slab_cells(store: Store, number: int, rows: Rows, voxel: float) -> CellS
 
 
 def sort_slab(
-    store: Store, number: int, rows: Rows, stack: Stack
+    store: Store, number: int, stack: Stack
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Write a slab's points that join a stack by profile; return profiles and their counts."""
     StopWhenUnwanted(store).update("profiles", 0.0)
-    cut = store.open(f"cut-{number}")
-    xyz, normals, spacing = (
-        store.open(n)[slice(*rows)][cut] for n in ("surface", "normals", "spacing")
-    )
-    profile = np.empty(len(cut), np.int32)
+    xyz, normals, spacing = (store.open(f"cut-{name}-{number}") for name in CUT_ARRAYS)
+    profile = np.empty(len(xyz), np.int32)
     kernels.find_profiles(
         xyz, normals, spacing, 0, len(profile), stack.direction, stack.width, stack.offset,
         MAX_SLOPE, stack.min_spacing, profile,
@@ -167,7 +170,7 @@ def sort_slab(
     joins = np.flatnonzero(profile != kernels.NOT_CUT)
     keys = profile[joins].astype(np.int64)
     order = argsort_keys(keys - keys.min(initial=0))
-    store.save(f"sorted-{number}", cut[joins[order]])
+    store.save(f"sorted-{number}", joins[order].astype(np.int32))
     profiles, counts = np.unique(keys, return_counts=True)
     return profiles, counts
 
@@ -176,27 +179,20 @@ def ellipses_of_batch(
     store: Store,
     number: int,
     begins: NDArray[np.int64],
-    firsts: tuple[int, ...],
     stack: Stack,
     settings: Settings,
     facts: Facts,
 ) -> Ellipses:
     """Segment whole profiles and fit their ellipses; write the points of their curves."""
-    # In each profile in the order of the whole surface, since the slabs are.
-    index = np.concatenate(
-        [
-            store.open(f"sorted-{k}")[a:b] + np.int32(first)
-            for k, (first, (a, b)) in enumerate(zip(firsts, begins.tolist(), strict=True))
-        ]
-    )
-    surface = Surface(
-        store.open("surface")[index],
-        store.open("normals")[index],
-        store.open("spacing")[index],
-        np.empty(0, np.int32),
-        facts.voxel,
-        facts.noise,
-    )
+    chosen = [store.open(f"sorted-{k}")[a:b] for k, (a, b) in enumerate(begins.tolist())]
+
+    def of_all(name: str) -> NDArray[Any]:
+        # In each profile in the order of the whole surface, since the slabs are.
+        return np.concatenate([store.open(f"{name}-{k}")[own] for k, own in enumerate(chosen)])
+
+    index = of_all("cut")
+    xyz, normals, spacing = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
+    surface = Surface(xyz, normals, spacing, np.empty(0, np.int32), facts.voxel, facts.noise)
     curves, ellipses = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
     store.save(f"points-{number}", index[curves.points])
     store.save(f"curves-{number}", curves.starts)
