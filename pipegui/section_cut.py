@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from pipecore.deformation.section_curve import SectionCurve
 
 
+MAX_ASKEW = 0.25
+"""The ellipse of half a section or less is the pipe's only if its centre is this near, in radii."""
+
+
 @dataclass(frozen=True, eq=False)
 class Ellipse:
     """An ellipse in a profile's plane: millimetres, u to 3:00, v to 12:00."""
@@ -45,6 +49,9 @@ class SectionCut:
         The smooth curve through the points, about the centre of `reference`.
     no_curve : str
         Why there is none.
+    is_askew : bool
+        Whether so little of the section is seen, and so much of that is deformed, that the
+        ellipse through it is not the pipe's.
     """
 
     points_uv: Array
@@ -53,6 +60,7 @@ class SectionCut:
     nominal: Ellipse | None = None
     curve: "SectionCurve | None" = None
     no_curve: str = ""
+    is_askew: bool = False
 
 
 def cut_section(element: Element, profile: Profiles, xyz: Array) -> SectionCut:
@@ -100,6 +108,7 @@ def cut_section(element: Element, profile: Profiles, xyz: Array) -> SectionCut:
     nominal = None
     if element.nominal is not None:
         nominal = contour(500 * element.nominal.outside_diameter)
+    off_axis = float(np.hypot(axis_u, axis_v))
     return SectionCut(
         points_uv,
         fitted,
@@ -107,4 +116,5 @@ def cut_section(element: Element, profile: Profiles, xyz: Array) -> SectionCut:
         nominal,
         curve if isinstance(curve, SectionCurve) else None,
         "" if isinstance(curve, SectionCurve) else str(curve.reason),
+        float(profile.arc[0]) < np.pi and off_axis > MAX_ASKEW * fitted.semi_minor_mm,
     )

@@ -166,7 +166,8 @@ class SectionView(Chart):
             dotted = pg.mkPen(theme.colour("text"), width=1.2, style=Qt.PenStyle.DotLine)
             self._draw_contour(cut.nominal, dotted, factor)
         self._draw_clock(reference)
-        if self._shows("ellipse") and (factor == 1 or _is_around(cut.fitted, reference)):
+        is_drawable = factor == 1 or _is_around(cut.fitted, reference)
+        if self._shows("ellipse") and is_drawable and not cut.is_askew:
             self._draw_contour(cut.fitted, pg.mkPen(faint(_points_colour(), 0.9), width=1), factor)
         if self._shows("points"):
             points = cut.points_uv[:: max(1, -(-len(cut.points_uv) // MAX_POINTS))]

@@ -1,5 +1,7 @@
 """Sections as they are cut and dimensioned, without a window."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,23 @@ def test_that_the_depth_of_a_dented_section_is_that_of_the_dent(depth, seen):
     length = np.linalg.norm(found_depth.ends_uv[1] - found_depth.ends_uv[0])
     assert length == pytest.approx(found_depth.value_mm, rel=1e-6)
     assert deviations(found_depth.ends_uv[:1], section.reference) == pytest.approx(0, abs=1e-6)
+
+
+def test_that_an_ellipse_through_little_but_a_dent_is_not_the_pipes():
+    aside = PROFILE.centre + 0.4 * PIPE.radius * np.cross(PIPE.axis.tangent(CHAINAGE), [0, 0, 1.0])
+    section = cut(dented(0.01), ONE_SIDE)
+    assert not section.is_askew
+    for arc, is_askew in ((np.deg2rad(90), True), (np.deg2rad(300), False)):
+        askew = replace(PROFILE, centre=aside, arc=np.array([arc]))
+        section = cut_section(
+            PIPE,
+            askew,
+            surface_points(
+                PIPE.axis, np.array([CHAINAGE] * 9), PIPE.radius, np.linspace(0.3, 1.8, 9)
+            ),
+        )
+        assert section.is_askew == is_askew
+        assert ("radius not measurable" in dimensions_text(askew, section)) == is_askew
 
 
 def test_that_a_bulge_has_a_height_and_a_clean_pipe_neither():
