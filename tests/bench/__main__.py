@@ -26,7 +26,10 @@ OUT = ROOT / "out" / "bench"
 DEMO = ROOT / "resources" / "demo" / "demo.laz"
 
 KEPT = OUT / "lines.pickle"
-"""What has been measured; read again by `--add`."""
+"""What has been measured: lines, those of other programs and the size of their cloud; read
+again by `--add`."""
+
+Kept = tuple[dict[tuple[int, int], Line], list[PeerLine], float]
 
 READ_WITH_LASPY = "import sys, laspy; laspy.read(sys.argv[1]).xyz"
 
@@ -63,10 +66,9 @@ def cloud_of(million: float) -> Path:
     return cloud
 
 
-def measure(
-    points: Sequence[float], threads: Sequence[int], lines: dict[tuple[int, int], Line]
-) -> None:
+def measure(points: Sequence[float], threads: Sequence[int], kept: Kept) -> None:
     """Measure detections of all sizes and numbers of threads, with laspy beside each."""
+    lines = kept[0]
     for million in points:
         cloud = cloud_of(million)
         for n_threads in threads:
@@ -78,7 +80,7 @@ def measure(
             n_elements = len(result["elements"])
             line = Line(result["n_cloud_points"], n_threads, n_elements, cost, reading)
             lines[line.n_points, n_threads] = line
-            KEPT.write_bytes(pickle.dumps(lines))
+            KEPT.write_bytes(pickle.dumps(kept))
             print(page.row_of(line), flush=True)
 
 
@@ -113,11 +115,14 @@ def main() -> None:
     args = parser.parse_args()
     OUT.mkdir(parents=True, exist_ok=True)
     compiling = compiling_seconds(max(args.threads))
-    # Our own file.
-    lines = pickle.loads(KEPT.read_bytes()) if args.add and KEPT.exists() else {}
-    measure(args.points, sorted(set(args.threads)), lines)
-    peers = measure_peers(args.peers) if args.peers else []
-    page.write([lines[key] for key in sorted(lines)], peers, args.peers, compiling, sys.argv[1:])
+    kept: Kept = {}, [], 0.0
+    if args.add and KEPT.exists():
+        kept = pickle.loads(KEPT.read_bytes())  # our own file
+    if args.peers:
+        kept = kept[0], measure_peers(args.peers), args.peers
+    measure(args.points, sorted(set(args.threads)), kept)
+    lines, peers, million = kept
+    page.write([lines[key] for key in sorted(lines)], peers, million, compiling, sys.argv[1:])
 
 
 if __name__ == "__main__":
