@@ -14,8 +14,8 @@ from pipecore.settings import TilingSettings
 
 GIB = 2**30
 
-ONE_PIECE_BYTES = 250
-"""What a detection in one piece may take a point; 140 to 160 were seen at 4 and 16 million."""
+ONE_PIECE_BYTES = 150
+"""What a detection in one piece may take a point; 110 to 120 were seen at 4 and 16 million."""
 BASE_BYTES = 400 * 2**20
 """The program itself with its libraries and compiled kernels."""
 KEPT_BYTES = 16
