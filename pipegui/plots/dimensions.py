@@ -103,7 +103,7 @@ def dimensions_text(profile: Profiles, cut: SectionCut) -> str:
     """Return what is measured of the section, as far as the scan carries it."""
     radius = format_measure(1000 * profile.radius[0], 1000 * profile.radius_sd[0], "mm")
     parts = [
-        tr("radius not measurable: little is seen, and that is deformed")
+        tr("Radius not measurable: little is seen, and that is deformed")
         if cut.is_askew
         else tr("Radius {radius}").format(radius=radius),
         tr("arc seen {arc:.0f}°").format(arc=np.rad2deg(profile.arc[0])),
