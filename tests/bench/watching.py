@@ -1,5 +1,9 @@
 """What a process takes: time, memory, and both by the stages that it tells of.
 
+Memory is that of a process and of all that it has started, at one time. Pages that several
+of them share, or that one has mapped twice, are counted once where the system tells (PSS of
+Linux); they are what tiles and their workers are made of.
+
 Imports nothing large: Linux counts what this process had needed as the other's from its start.
 """
 
@@ -9,14 +13,19 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+
+import psutil
 
 KIBIBYTES = 1 if sys.platform == "darwin" else 1024
 """Unit of ru_maxrss in bytes."""
 EVERY = 0.02
 """Between two looks at a process's memory, seconds."""
+LONGEST_SHARE = 0.05
+"""Of the time, for telling shared pages apart: the system goes through all pages for that."""
 STAGE = re.compile(r"^(\w[\w ]*?)\s+(\d+\.\d) s$")
 """What `pipecore` prints when a stage is done."""
 
@@ -58,10 +67,11 @@ def run(command: Sequence[str], cwd: Path | None = None, **environment: str) -> 
     watch = _Watch(process.pid, begin)
     assert process.stderr is not None
     told = []
-    for line in process.stderr:
-        told.append(line)
-        if found := STAGE.match(line.strip()):
-            watch.end_stage(found[1].lower(), float(found[2]))
+    with process.stderr:
+        for line in process.stderr:
+            told.append(line)
+            if found := STAGE.match(line.strip()):
+                watch.end_stage(found[1].lower(), float(found[2]))
     _, status, usage = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     wall = time.perf_counter() - begin
@@ -69,7 +79,58 @@ def run(command: Sequence[str], cwd: Path | None = None, **environment: str) -> 
     watch.end(wall, cpu)
     if process.returncode != 0:
         raise SystemExit(f"This failed: {' '.join(command)}\n{''.join(told[-20:])}")
-    return Cost(wall, cpu, usage.ru_maxrss * KIBIBYTES, watch.stages)
+    # One that was over before it could be looked at has not shared much.
+    memory = watch.memory or usage.ru_maxrss * KIBIBYTES
+    return Cost(wall, cpu, memory, watch.stages)
+
+
+class Footprint:
+    """The memory of a process and of all that it has started.
+
+    Resident pages are counted at each look. Which of them are counted more than once is found
+    out now and then, and taken as the same share until the next time.
+
+    Parameters
+    ----------
+    pid : int
+    """
+
+    def __init__(self, pid: int) -> None:
+        self._first = psutil.Process(pid)
+        self._all = [self._first]
+        self._share = 1.0
+        self._next = 0.0
+
+    def memory(self) -> int:
+        """Bytes; raises `psutil.Error` when the process is gone."""
+        begin = time.monotonic()
+        if begin >= self._next:
+            self._all = [self._first, *self._first.children(recursive=True)]
+            resident, proportional = self._sum(_resident), self._sum(_proportional)
+            self._share = proportional / resident if resident else 1.0
+            end = time.monotonic()
+            self._next = end + (end - begin) / LONGEST_SHARE
+            return proportional
+        return round(self._share * self._sum(_resident))
+
+    def _sum(self, of: Callable[[psutil.Process], int]) -> int:
+        total = of(self._first)
+        for process in self._all[1:]:
+            with suppress(psutil.Error):  # it has ended
+                total += of(process)
+        return total
+
+
+def _resident(process: psutil.Process) -> int:
+    return int(process.memory_info().rss)
+
+
+def _proportional(process: psutil.Process) -> int:
+    """Bytes with a page's share only where others hold it too, or all where nobody tells."""
+    with suppress(psutil.AccessDenied):
+        if told := getattr(process.memory_full_info(), "pss", 0):
+            return int(told)
+    return _resident(process)
 
 
 class _Watch:
@@ -85,18 +146,19 @@ class _Watch:
         self._thread = threading.Thread(target=self._look, daemon=True)
         self._thread.start()
 
+    @property
+    def memory(self) -> int:
+        """The highest that was seen, bytes."""
+        return max((memory for _, _, memory in self._seen), default=0)
+
     def _look(self) -> None:
-        page, tick = os.sysconf("SC_PAGE_SIZE"), os.sysconf("SC_CLK_TCK")
-        folder = Path(f"/proc/{self._pid}")
-        while not self._is_over.wait(EVERY):
-            try:
-                resident = int((folder / "statm").read_text(encoding="ascii").split()[1])
-                times = (folder / "stat").read_text(encoding="ascii").rpartition(")")[2].split()
-            except (OSError, IndexError):
-                return
-            wall = time.perf_counter() - self._begin
-            cpu = (int(times[11]) + int(times[12])) / tick
-            self._seen.append((wall, cpu, resident * page))
+        with suppress(psutil.Error):
+            footprint, process = Footprint(self._pid), psutil.Process(self._pid)
+            while not self._is_over.wait(EVERY):
+                memory, times = footprint.memory(), process.cpu_times()
+                wall = time.perf_counter() - self._begin
+                # With what has ended of its own processes.
+                self._seen.append((wall, sum(times[:4]), memory))
 
     def end_stage(self, name: str, seconds: float) -> None:
         """A stage ends now that began `seconds` ago; what was before is of the start."""
