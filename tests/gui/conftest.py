@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import shiboken6
 from PySide6.QtCore import QCoreApplication, QEvent, QSettings, QStandardPaths
+from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -17,6 +18,7 @@ from pipegui.jobs import Jobs
 from pipegui.main_window import MainWindow
 from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_parts
+from tests.gui.patience import PatientBot
 
 
 @pytest.fixture(scope="session")
@@ -24,6 +26,12 @@ def qapp(qapp: QApplication) -> QApplication:
     QStandardPaths.setTestModeEnabled(True)
     theme.apply_theme(qapp)
     return qapp
+
+
+@pytest.fixture
+def qtbot(qapp: QApplication, request: pytest.FixtureRequest) -> QtBot:
+    """In place of pytest-qt's own, which gives up after five seconds."""
+    return PatientBot(request)
 
 
 def _flush() -> None:
@@ -85,6 +93,8 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
         return
     # Made before the test's own fixtures, and so looked at after they are gone.
     app = request.getfixturevalue("qapp")
+    # Where no window comes to lie under it, wherever the last test has left it.
+    QCursor.setPos(app.primaryScreen().geometry().bottomRight())
     windows = _top_level(app)
     threads, render_windows = set(threading.enumerate()), _render_windows()
     yield

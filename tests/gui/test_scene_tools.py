@@ -14,6 +14,7 @@ from pipegui.scene.measure_marks import lines_of
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import ORIGIN, make_scan
+from tests.gui.patience import hover
 from tests.gui.test_scene_view import drag, mouse_move, on_screen, picture, seen_points, settle
 
 CLOUD, RESULT = make_scan()
@@ -113,12 +114,12 @@ def test_that_the_line_follows_the_cursor_to_the_second_point(desk, qtbot):
     first, second = seen_points(desk.scene, 2)[0], seen_points(desk.scene, 7)[0]
     desk.do(view_commands.choose_tool, Tool.MEASURE)
     desk.click(on_screen(desk.scene, first))
-    with qtbot.waitSignal(desk.scene.hovered):
-        qtbot.mouseMove(desk.scene.canvas, on_screen(desk.scene, second) + QPoint(1, 0))
-        qtbot.mouseMove(desk.scene.canvas, on_screen(desk.scene, second))
+    told = []
+    desk.scene.hovered.connect(told.append)
+    hover(qtbot, desk.scene.canvas, on_screen(desk.scene, second), lambda: told[-1:] == [second])
     QApplication.processEvents()
     (mark,) = desk.scene.overlay.marks
-    distance = np.linalg.norm(np.array(mark.measurement.end) - CLOUD.xyz[first])
+    distance = np.linalg.norm(CLOUD.xyz[second] - CLOUD.xyz[first])
     assert mark.lines[0] == f"{distance:.3f} m"
 
 

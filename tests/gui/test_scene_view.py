@@ -23,6 +23,7 @@ from pipegui.scene.shapes import ellipses
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import make_scan
+from tests.gui.patience import hover
 
 CLOUD, RESULT = make_scan()
 STILL = ViewOptions(fly=False, colour_by=ColourBy.SEGMENT, show_labels=False)
@@ -49,8 +50,10 @@ def scene(qtbot, no_leaks):
 
 def settle(qtbot, view):
     """Wait until the camera rests and the picture is drawn in full."""
-    qtbot.waitUntil(lambda: not view.canvas.is_moving and view.points.n_shown > 0, timeout=20_000)
-    QApplication.processEvents()
+    canvas = view.canvas
+    qtbot.waitUntil(
+        lambda: not canvas.is_moving and not canvas._is_stale and view.points.n_shown > 0
+    )
 
 
 def on_screen(view, index):
@@ -225,10 +228,10 @@ def test_that_a_click_on_a_label_picks_its_deformation(scene, qtbot):
 
 def test_that_hovering_tells_the_element_under_the_cursor(scene, qtbot):
     (index, *_) = seen_points(scene, 7)
-    with qtbot.waitSignal(scene.hovered) as hovered:
-        qtbot.mouseMove(scene.canvas, on_screen(scene, index) + QPoint(1, 0))
-        qtbot.mouseMove(scene.canvas, on_screen(scene, index))
-    assert RESULT.element_id[hovered.args[0]] == 7
+    told = []
+    scene.hovered.connect(told.append)
+    hover(qtbot, scene.canvas, on_screen(scene, index), lambda: told[-1:] == [index])
+    assert RESULT.element_id[told[-1]] == 7
 
 
 def test_that_only_what_differs_is_done_anew(scene, qtbot, monkeypatch):
