@@ -91,6 +91,7 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
     with _timed(seconds, "ellipses"):
         progress.update("ellipses", 0.0)
         ellipses = Ellipses.concatenate(found)
+        found.clear()  # the same again
     with _timed(seconds, "axes"):
         chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):

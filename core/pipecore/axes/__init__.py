@@ -1,13 +1,17 @@
 """Axes: ellipse centres joined by proximity (paper, section 3.3.5)."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from pipecore._kernels.chains import unite_followers
+from pipecore._kernels.components import flatten
 from pipecore.ellipses import Ellipses
 from pipecore.progress import Progress
+
+Array = NDArray[np.float64]
 
 REACH = 3.5
 """Centres join within this many profile widths of each other, along the axis."""
@@ -19,8 +23,8 @@ MAX_RADIUS_CHANGE = 0.06
 """Their radii differ by less than this share (and twice its standard deviation)."""
 MAX_OFFSET = 0.1
 """They are off each other's axis by less than this share of the radius."""
-AT_ONCE = 500_000
-"""Pairs that are looked at together."""
+AT_ONCE = 100_000
+"""Ellipses whose neighbours are looked for together."""
 
 
 def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
@@ -40,47 +44,43 @@ def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
     n = len(ellipses)
     if n == 0:
         return np.empty(0, np.int32)
-    tree = cKDTree(ellipses.centre)
     # Wide pipes have coarser centres, so they look further; each size class by itself.
     reach = np.maximum(REACH * ellipses.width, WIDE_REACH * ellipses.radius)
     least = reach.min()
-    links = []
+    roots = np.arange(n, dtype=np.int32)
     size_class = np.ceil(np.log2(reach / least) - 1e-9).astype(int)
     for k in np.unique(size_class):
-        members = np.flatnonzero(size_class == k)
-        distance = least * 2.0**k
-        near = tree if k == 0 else cKDTree(ellipses.centre[members])
-        pairs = near.query_pairs(distance, output_type="ndarray")
-        if k > 0:
-            pairs = members[pairs]
-        for start in range(0, max(len(pairs), 1), AT_ONCE):
-            some = pairs[start : start + AT_ONCE]
-            links.append(some[_follow(ellipses, some[:, 0], some[:, 1])])
+        # The smallest ones join with all that are near, the others among themselves.
+        members = np.arange(n) if k == 0 else np.flatnonzero(size_class == k)
+        members = members[np.argsort(ellipses.centre[members, 0], kind="stable")]
+        for some, pairs in _near(ellipses.centre[members], least * 2.0**k):
             progress.update("axes", 0.5)
-    i, j = np.concatenate(links).T
-    graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(n, n))
-    _, label = connected_components(graph, directed=False)
-    sizes = np.bincount(label)
+            unite_followers(
+                pairs, members[some], ellipses.centre, ellipses.axis, ellipses.radius,
+                ellipses.radius_sd, MAX_TURN_COS, MAX_RADIUS_CHANGE, MAX_OFFSET, roots,
+            )  # fmt: skip
+    flatten(roots)
+    _, label, sizes = np.unique(roots, return_inverse=True, return_counts=True)
     rank = np.empty(len(sizes), np.int32)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes), dtype=np.int32)
     progress.update("axes", 1.0)
     return np.asarray(rank[label])
 
 
-def _follow(e: Ellipses, i: NDArray[np.intp], j: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether ellipses i and j may be neighbours on one axis."""
-    turn = np.abs(np.einsum("ij,ij->i", e.axis[i], e.axis[j]))
-    smaller = np.minimum(e.radius[i], e.radius[j])
-    sd = np.hypot(e.radius_sd[i], e.radius_sd[j])
-    chord = e.centre[j] - e.centre[i]
-    mean_axis = (
-        e.axis[i] + np.sign(np.einsum("ij,ij->i", e.axis[i], e.axis[j]))[:, None] * e.axis[j]
-    )
-    mean_axis /= np.linalg.norm(mean_axis, axis=1)[:, None]
-    along = np.einsum("ij,ij->i", chord, mean_axis)
-    offset = np.sqrt(np.maximum(np.einsum("ij,ij->i", chord, chord) - along**2, 0.0))
-    return np.asarray(
-        (turn > MAX_TURN_COS)
-        & (np.abs(e.radius[i] - e.radius[j]) < MAX_RADIUS_CHANGE * smaller + 2 * sd)
-        & (offset < MAX_OFFSET * smaller + 2 * sd)
-    )
+def _near(centres: Array, distance: float) -> Iterator[tuple[slice, NDArray[np.intp]]]:
+    """Pairs of centres within a distance, some places at a time: all at once are too many.
+
+    The centres are in the order of their x.
+
+    Yields
+    ------
+    (slice, ndarray of shape (n, 2))
+        A range of the centres, and pairs within it.
+    """
+    x = centres[:, 0]
+    for first in range(0, len(x), AT_ONCE):
+        # Those of the next range that are near some of this one come with it.
+        last = min(first + AT_ONCE, len(x)) - 1
+        end = int(np.searchsorted(x, x[last] + distance, side="right"))
+        tree = cKDTree(centres[first:end])
+        yield slice(first, end), tree.query_pairs(distance, output_type="ndarray")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from pipecore import axes
 from pipecore.axes import join_centres
 from pipecore.ellipses import Ellipses
 from pipecore.geometry import ArcAxis, Axis, LineAxis
@@ -138,3 +139,16 @@ def test_that_the_chain_with_most_ellipses_comes_first_whatever_their_order(rng)
 
 def test_that_no_ellipses_make_no_chains(rng):
     assert len(join_centres(along(straight(rng), 0.1)[:0], NoProgress())) == 0
+
+
+def test_that_places_looked_at_one_after_the_other_give_the_same_chains(rng, monkeypatch):
+    # Of all sizes, so that some look far, in any order and with many centres at one place.
+    radii = rng.uniform(0.02, 0.9, 12)
+    parts = [along(straight(rng, 0.6), radius, rng=rng) for radius in radii]
+    parts += [along(LineAxis(np.zeros(3), np.eye(3)[k], 0.3), 0.05, rng=rng) for k in (1, 2)]
+    together = Ellipses.concatenate(parts)
+    together = together[rng.permutation(len(together))]
+    expected = join_centres(together, NoProgress())
+    assert expected.max() > 5
+    monkeypatch.setattr(axes, "AT_ONCE", 7)
+    assert_array_equal(join_centres(together, NoProgress()), expected)
