@@ -1,8 +1,9 @@
-"""Sums over the cells of a deviation map for its contour: splines along, harmonics around.
+"""The contour of a deviation map fitted to its cells: splines along, harmonics around.
 
 A row of cells lies in the reach of four splines, the first of which is `first[row]`, with the
 values `basis[row]`; `harmonics` (columns, terms) are the values of the terms per column.
-Unknowns are in the order (spline, term). Cells of weight zero are not used.
+Unknowns are in the order (spline, term). Cells that are used stand row by row in lists: those
+of a row from `starts[row]` on, each with its column, height and weight.
 """
 
 import math
@@ -12,8 +13,30 @@ from numba import njit
 
 
 @njit(cache=True, nogil=True)
-def normal_equations(first, basis, harmonics, height, weight, band, right):
-    """Add Σ w aaᵀ to a lower band, band[i - j, j], and write Σ w a·height to `right`."""
+def list_cells(height, variance, used, floor):
+    """List the cells of rows that are used whose height and variance are finite.
+
+    Returns where rows start, and columns, heights and weights 1 / (variance + floor²).
+    """
+    n_rows, n_columns = height.shape
+    starts = np.zeros(n_rows + 1, np.int64)
+    column = np.empty(height.size, np.int32)
+    values, weights = np.empty(height.size), np.empty(height.size)
+    n = 0
+    for r in range(n_rows):
+        if used[r]:
+            for c in range(n_columns):
+                if math.isfinite(variance[r, c]) and math.isfinite(height[r, c]):
+                    column[n], values[n] = c, height[r, c]
+                    weights[n] = 1.0 / (variance[r, c] + floor * floor)
+                    n += 1
+        starts[r + 1] = n
+    return starts, column[:n], values[:n], weights[:n]
+
+
+@njit(cache=True, nogil=True)
+def normal_equations(first, basis, harmonics, starts, column, height, weight, band, right):
+    """Add Σ w aaᵀ to a lower band, band[j, i - j], and write Σ w a·height to `right`."""
     n_columns, n_terms = harmonics.shape
     n_pairs = n_terms * (n_terms + 1) // 2
     pairs = np.empty((n_columns, n_pairs))
@@ -25,16 +48,16 @@ def normal_equations(first, basis, harmonics, height, weight, band, right):
                 p += 1
     right[:] = 0.0
     sums, moments, pull = np.empty(n_pairs), np.empty((n_terms, n_terms)), np.empty(n_terms)
-    for r in range(weight.shape[0]):
+    for r in range(first.shape[0]):
+        if starts[r] == starts[r + 1]:
+            continue
         sums[:] = 0.0
         pull[:] = 0.0
-        for c in range(n_columns):
-            w = weight[r, c]
-            if w == 0.0:
-                continue
+        for i in range(starts[r], starts[r + 1]):
+            w, c = weight[i], column[i]
             for p in range(n_pairs):
                 sums[p] += w * pairs[c, p]
-            w *= height[r, c]
+            w *= height[i]
             for k in range(n_terms):
                 pull[k] += w * harmonics[c, k]
         p = 0
@@ -47,12 +70,40 @@ def normal_equations(first, basis, harmonics, height, weight, band, right):
             for k in range(n_terms):
                 right[row + k] += basis[r, a] * pull[k]
             for b in range(a + 1):
-                column = (first[r] + b) * n_terms
+                at = (first[r] + b) * n_terms
                 product = basis[r, a] * basis[r, b]
-                for k in range(n_terms):
+                for m in range(n_terms):
                     # Below the diagonal only.
-                    for m in range(n_terms if b < a else k + 1):
-                        band[row + k - column - m, column + m] += product * moments[k, m]
+                    for k in range(0 if b < a else m, n_terms):
+                        band[at + m, row + k - at - m] += product * moments[k, m]
+
+
+@njit(cache=True, nogil=True)
+def factorise_band(band):
+    """Turn a lower band of a positive definite matrix, band[j, i - j], into its Cholesky factor."""
+    size, width = band.shape
+    for j in range(size):
+        root = math.sqrt(band[j, 0])
+        reach = min(width, size - j)
+        for i in range(reach):
+            band[j, i] /= root
+        for k in range(1, reach):
+            for i in range(reach - k):
+                band[j + k, i] -= band[j, k] * band[j, k + i]
+
+
+@njit(cache=True, nogil=True)
+def solve_by_band(band, right):
+    """Solve by a factor of `factorise_band`; `right` becomes the solution."""
+    size, width = band.shape
+    for j in range(size):
+        right[j] /= band[j, 0]
+        for i in range(1, min(width, size - j)):
+            right[j + i] -= band[j, i] * right[j]
+    for j in range(size - 1, -1, -1):
+        for i in range(1, min(width, size - j)):
+            right[j] -= band[j, i] * right[j + i]
+        right[j] /= band[j, 0]
 
 
 @njit(cache=True, nogil=True)
@@ -70,34 +121,72 @@ def heights(first, basis, harmonics, coefficients, table):
 
 
 @njit(cache=True, nogil=True)
-def scaled_residuals(first, basis, harmonics, coefficients, height, weight, residuals):
-    """Write residuals in units of their noise where weighted; return their robust spread."""
-    heights(first, basis, harmonics, coefficients, residuals)
-    found = np.empty(weight.size)
-    n = 0
-    for r in range(weight.shape[0]):
-        for c in range(weight.shape[1]):
-            if weight[r, c] > 0.0:
-                scaled = (height[r, c] - residuals[r, c]) * math.sqrt(weight[r, c])
-                residuals[r, c] = scaled
-                found[n] = abs(scaled)
-                n += 1
-    return 1.4826 * np.median(found[:n]) if n > 0 else 1.0
+def scaled_residuals(
+    first, basis, harmonics, coefficients, starts, column, height, weight, residuals
+):
+    """Write residuals in units of their noise; return their robust spread, at least 1."""
+    n_terms, n = harmonics.shape[1], height.shape[0]
+    terms = np.empty(n_terms)
+    found, n_small = np.empty(n), 0
+    for r in range(first.shape[0]):
+        for k in range(n_terms):
+            terms[k] = 0.0
+            for a in range(4):
+                terms[k] += basis[r, a] * coefficients[first[r] + a, k]
+        for i in range(starts[r], starts[r + 1]):
+            fitted = 0.0
+            for k in range(n_terms):
+                fitted += terms[k] * harmonics[column[i], k]
+            residuals[i] = (height[i] - fitted) * math.sqrt(weight[i])
+            found[i] = abs(residuals[i])
+            n_small += found[i] <= 1.0 / 1.4826
+    # Their median is sought only where it is not below one for sure.
+    return max(1.4826 * np.median(found), 1.0) if n_small <= n // 2 and n > 0 else 1.0
 
 
 @njit(cache=True, nogil=True)
 def reweight(residuals, weight, spread, cauchy, tukey, weights):
     """Write `weight` times the loss's weights: Cauchy's where `cauchy` is positive, or Tukey's."""
-    for r in range(weight.shape[0]):
-        for c in range(weight.shape[1]):
-            w = weight[r, c]
-            if w > 0.0:
-                t = residuals[r, c] / spread
-                if cauchy > 0.0:
-                    w /= 1.0 + (t / cauchy) ** 2
-                else:
-                    w *= max(1.0 - (t / tukey) ** 2, 0.0) ** 2
-            weights[r, c] = w
+    for i in range(weight.shape[0]):
+        t = residuals[i] / spread
+        if cauchy > 0.0:
+            weights[i] = weight[i] / (1.0 + (t / cauchy) ** 2)
+        else:
+            weights[i] = weight[i] * max(1.0 - (t / tukey) ** 2, 0.0) ** 2
+
+
+@njit(cache=True, nogil=True)
+def fit_robustly(
+    first, basis, harmonics, starts, column, height, weight, prior, cauchy, tukey, n_rounds,
+    tolerance, band, coefficients,
+):  # fmt: skip
+    """Fit by Cauchy's weights, then by Tukey's, at most `n_rounds` of each.
+
+    A loss has done its part where no coefficient changes by more than `tolerance`. Writes the
+    coefficients, and the factor of their normal equations to `band`; returns how often it solved.
+    """
+    own, residuals = weight.copy(), np.empty(weight.shape[0])
+    solution = coefficients.reshape(-1)
+    before = np.empty(solution.shape[0])
+    n_solved = 0
+    for loss in range(3):
+        # Plain first, which is one round.
+        for _ in range(n_rounds if loss else 1):
+            if loss:
+                spread = scaled_residuals(
+                    first, basis, harmonics, coefficients, starts, column, height, weight, residuals
+                )
+                bend = cauchy if loss == 1 else 0.0
+                reweight(residuals, weight, spread, bend, tukey, own)
+            before[:] = solution
+            band[:, :] = prior
+            normal_equations(first, basis, harmonics, starts, column, height, own, band, solution)
+            factorise_band(band)
+            solve_by_band(band, solution)
+            n_solved += 1
+            if loss and np.abs(solution - before).max() <= tolerance:
+                break
+    return n_solved
 
 
 @njit(cache=True, nogil=True)

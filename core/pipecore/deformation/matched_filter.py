@@ -11,9 +11,8 @@ which uses holes and uneven density for what they are.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
-from pipecore._kernels.maps import strongest
+from pipecore._kernels import maps as kernels
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
@@ -40,63 +39,116 @@ class Candidate:
     inflation: float
 
 
-def find_candidates(
-    grid: Grid,
-    *,
-    deviation: Array,
-    weight: Array,
-    count: Array,
-    contour_sd: Array,
-    allowed: Flags,
-    threshold: float,
-) -> list[Candidate]:
-    """Return bumps and dents above `threshold` times their noise, strongest first.
+@dataclass(frozen=True, eq=False)
+class MatchedFilter:
+    """The filter of a map: what its bumps of each extent meet, whatever the contour is.
 
     Parameters
     ----------
     grid : Grid
-    deviation, weight, count, contour_sd : ndarray, shape (rows, columns)
-        Cell means, their inverse variances (0 where empty), points, and the contour's sd.
-    allowed : ndarray of bool
+    weight : ndarray, shape (rows, columns)
+        Inverse variances of the cell means, 0 where empty.
+    allowed : ndarray of bool, shape (rows, columns)
         Cells where a peak may lie.
-    threshold : float
+    layers : tuple of Layer
     """
-    layers = []
-    diameter = 2 * grid.radius
-    for extent in EXTENTS:
-        size = extent * diameter
-        if size < 2.5 * max(grid.row_size, grid.column_size):
-            continue
-        height, sd, points = _respond(grid, deviation, weight, count, size)
-        z = np.where(points >= MIN_POINTS, height / np.hypot(sd, contour_sd), 0.0)
-        quiet = z[allowed & (points >= MIN_POINTS)]
-        # Noise that neighbours share shows as a spread of z above one.
-        spread = 1.4826 * float(np.median(np.abs(quiet))) if len(quiet) > 20 else 1.0
-        inflation = max(1.0, spread)
-        layers.append((z / inflation, height, size, inflation))
 
-    found: list[Candidate] = []
-    free = allowed.copy()
-    while layers:
-        peaks = [strongest(z, free) for z, *_ in layers]
-        best = max(range(len(layers)), key=lambda k: peaks[k][0])
-        z, height, size, inflation = layers[best]
-        row, column = divmod(peaks[best][1], grid.n_columns)
-        if not free[row, column] or abs(z[row, column]) < threshold:
-            break
-        found.append(
-            Candidate(
-                float(grid.chainages[row]),
-                float(grid.clocks[column]),
-                size,
-                size,
-                float(height[row, column]),
-                float(z[row, column]),
-                inflation,
-            )
+    grid: Grid
+    weight: Array
+    allowed: Flags
+    layers: tuple["Layer", ...]
+
+    @classmethod
+    def of(cls, grid: Grid, weight: Array, count: Array, allowed: Flags) -> "MatchedFilter":
+        """Return that of a map with so many points in its cells."""
+        sizes = np.array(EXTENTS) * 2 * grid.radius
+        wide = sizes[sizes >= 2.5 * max(grid.row_size, grid.column_size)]
+        return cls(
+            grid, weight, allowed, tuple(Layer.of(grid, weight, count, size) for size in wide)
         )
-        free &= ~disc(grid, found[-1].chainage, found[-1].clock, 1.2 * size, 1.2 * size)
-    return found
+
+    def find(self, deviation: Array, contour_sd: Array, threshold: float) -> list[Candidate]:
+        """Return bumps and dents above `threshold` times their noise, strongest first.
+
+        Parameters
+        ----------
+        deviation, contour_sd : ndarray, shape (rows, columns)
+            Cell means above the contour, nan where empty, and the contour's standard deviation.
+        threshold : float
+        """
+        grid = self.grid
+        pull = self.weight * np.nan_to_num(deviation)
+        heights, scores, inflations = [], [], []
+        for layer in self.layers:
+            height, z = np.empty(grid.shape), np.empty(grid.shape)
+            kernels.correlate(pull, layer.along, layer.around, height)
+            spread = kernels.score(
+                height, layer.precision, layer.is_told, contour_sd, self.allowed, z
+            )
+            # Noise that neighbours share shows as a spread of z above one.
+            inflations.append(max(1.0, spread))
+            heights.append(height)
+            scores.append(z)
+
+        found: list[Candidate] = []
+        free = self.allowed.copy()
+        peaks = [kernels.strongest(z, free) for z in scores]
+        while peaks:
+            for k, (_, place) in enumerate(peaks):
+                if not free.ravel()[place]:
+                    peaks[k] = kernels.strongest(scores[k], free)
+            best = max(range(len(peaks)), key=lambda k: peaks[k][0] / inflations[k])
+            row, column = divmod(peaks[best][1], grid.n_columns)
+            score = float(scores[best][row, column] / inflations[best])
+            if not free[row, column] or abs(score) < threshold:
+                break
+            size = self.layers[best].size
+            found.append(
+                Candidate(
+                    float(grid.chainages[row]),
+                    float(grid.clocks[column]),
+                    size,
+                    size,
+                    float(heights[best][row, column]),
+                    score,
+                    inflations[best],
+                )
+            )
+            free &= ~disc(grid, found[-1].chainage, found[-1].clock, 1.2 * size, 1.2 * size)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What bumps of one extent meet at every cell.
+
+    Parameters
+    ----------
+    size : float
+        Their extent, metres.
+    along, around : ndarray
+        The bump along the pipe and around it, by cells.
+    precision : ndarray, shape (rows, columns)
+        Inverse variance of a height there.
+    is_told : ndarray of bool, shape (rows, columns)
+        Whether there are points enough under a bump.
+    """
+
+    size: float
+    along: Array
+    around: Array
+    precision: Array
+    is_told: Flags
+
+    @classmethod
+    def of(cls, grid: Grid, weight: Array, count: Array, size: float) -> "Layer":
+        """Return that of bumps `size` metres wide."""
+        along, around = _bell(size, grid.row_size), _bell(size, grid.column_size)
+        precision, points = np.empty(grid.shape), np.empty(grid.shape)
+        kernels.correlate(weight, along**2, around**2, precision)
+        kernels.correlate(count, 1.0 * (along > 0.1), 1.0 * (around > 0.1), points)
+        precision = np.maximum(precision, 1e-12)
+        return cls(float(size), along, around, precision, points >= MIN_POINTS)
 
 
 def disc(grid: Grid, chainage: float, clock: float, length: float, width: float) -> Flags:
@@ -105,22 +157,6 @@ def disc(grid: Grid, chainage: float, clock: float, length: float, width: float)
     turn = np.mod(grid.clocks - clock + np.pi, 2 * np.pi) - np.pi
     around = turn * grid.radius / (width / 2)
     return np.asarray(along[:, None] ** 2 + around[None, :] ** 2 < 1.0)
-
-
-def _respond(
-    grid: Grid, deviation: Array, weight: Array, count: Array, size: float
-) -> tuple[Array, Array, Array]:
-    """Height of a bump of extent `size` at every cell, its sd, and the points under it."""
-    bell = [_bell(size, grid.row_size), _bell(size, grid.column_size)]
-
-    def correlate(table: Array, kernels: list[Array]) -> Array:
-        along = ndimage.correlate1d(table, kernels[0], axis=0, mode="constant")
-        return np.asarray(ndimage.correlate1d(along, kernels[1], axis=1, mode="wrap"))
-
-    evidence = correlate(weight * np.nan_to_num(deviation), bell)
-    precision = np.maximum(correlate(weight, [np.square(k) for k in bell]), 1e-12)
-    points = correlate(count, [(k > 0.1).astype(np.float64) for k in bell])
-    return evidence / precision, 1.0 / np.sqrt(precision), points
 
 
 def _bell(size: float, cell: float) -> Array:

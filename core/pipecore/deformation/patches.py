@@ -6,7 +6,7 @@ import numpy as np
 
 from pipecore.deformation.bump import TYPICAL_EXTENT, Bump, fit_bump
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid, dilate
-from pipecore.deformation.matched_filter import Candidate, disc, find_candidates
+from pipecore.deformation.matched_filter import Candidate, MatchedFilter, disc
 from pipecore.deformation.reference import Contour, fit_contour
 from pipecore.deformation.surface import Surface
 from pipecore.deformation.unrolled import stretch
@@ -80,39 +80,36 @@ def find_patches(
     the places that stand out so far, and more stands out over the better contour.
     """
     grid = cells.grid
-    variance = np.where(cells.count > 0, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
+    some = cells.count > 0
+    variance = np.where(some, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
+    weight = np.where(some, cells.count / cells.noise**2, 0.0)
+    allowed = cells.covered & ~cells.disputed
+    bumps = MatchedFilter.of(grid, weight, cells.count, allowed)
 
-    def contour_by(variance: Array) -> Contour:
-        return fit_contour(grid, cells.deviation, variance, n_terms, knot_diameters=knot_diameters)
-
-    contour = contour_by(variance)
-    for _ in range(N_ROUNDS):
-        masked = np.zeros(grid.shape, dtype=bool)
-        for seen in _candidates(cells, contour, MASKED_FROM * significance):
+    masked = np.zeros(grid.shape, dtype=bool)
+    for n_masks in range(N_ROUNDS + 1):
+        contour = fit_contour(
+            grid,
+            cells.deviation,
+            np.where(masked, np.inf, variance),
+            n_terms,
+            knot_diameters=knot_diameters,
+        )
+        deviation = cells.deviation - contour.height
+        found = bumps.find(deviation, contour.sd, MASKED_FROM * significance)
+        before, masked = masked, np.zeros(grid.shape, dtype=bool)
+        for seen in found:
             masked |= disc(grid, seen.chainage, seen.clock, MASK * seen.length, MASK * seen.width)
-        contour = contour_by(np.where(masked, np.inf, variance))
+        if n_masks == N_ROUNDS or np.array_equal(masked, before):
+            break  # The same mask leads to the same contour.
     patches = []
-    for seen in _candidates(cells, contour, MASKED_FROM * significance):
+    for seen in found:
         if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 3:
             patch = _measure(element, surface, cells, contour, seen)
             least = significance * (BULGE_FACTOR if seen.height > 0 else 1.0)
             if patch is not None and abs(patch.z) >= least and patch.is_enclosed:
                 patches.append(patch)
     return _without_overlap(patches), contour
-
-
-def _candidates(cells: DeviationMap, contour: Contour, threshold: float) -> list[Candidate]:
-    some = cells.count > 0
-    weight = np.where(some, cells.count / cells.noise**2, 0.0)
-    return find_candidates(
-        cells.grid,
-        deviation=cells.deviation - contour.height,
-        weight=weight,
-        count=cells.count,
-        contour_sd=contour.sd,
-        allowed=cells.covered & ~cells.disputed,
-        threshold=threshold,
-    )
 
 
 def _measure(

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import cho_solve_banded
 
 from pipecore._kernels import contour as kernels
 from pipecore.deformation.deviation_map import Flags, Grid
@@ -37,7 +37,9 @@ END_MARGIN = 0.3
 LEVEL_PRIOR, WALK_PRIOR = 0.1, 0.02
 """How far a coefficient lies from zero, and changes over two diameters: shares of the radius."""
 
-CAUCHY, TUKEY = 2.4, 4.7
+CAUCHY, TUKEY, N_ROUNDS = 2.4, 4.7, 6
+CHANGE = 1e-6
+"""A fit is done where no coefficient changes by more than that any more, metres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,18 +76,28 @@ class Contour:
     grid : Grid
     basis : Basis
     coefficients : ndarray, shape (splines, terms)
-    covariance : ndarray, shape (splines, terms, splines, terms)
+    factor : ndarray, shape (splines · terms, 4 · terms)
+        Cholesky's factor of their normal equations, by columns from the diagonal down.
     """
 
     grid: Grid
     basis: Basis
     coefficients: Array
-    covariance: Array
+    factor: Array
 
     @property
     def n_terms(self) -> int:
         """Three, or five with ovality."""
         return int(self.coefficients.shape[1])
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of the coefficients, shape (splines, terms, splines, terms)."""
+        unit = np.eye(len(self.factor))
+        inverse = cho_solve_banded(
+            (self.factor.T, True), unit, overwrite_b=True, check_finite=False
+        )
+        return np.ascontiguousarray(inverse).reshape(*self.coefficients.shape * 2)
 
     @cached_property
     def terms(self) -> Array:
@@ -164,45 +176,34 @@ def fit_contour(
     basis = spline_basis(grid, knot_diameters)
     phi = harmonics(grid.clocks, n_terms)
     prior = _prior_band(grid, basis.n_splines, n_terms, knot_diameters, constant_radius)
-    used = np.isfinite(variance) & np.isfinite(height)
-    used &= inner_rows(grid)[:, None]
-    y = np.where(used, height, 0.0)
-    base = np.where(used, 1.0 / (np.where(used, variance, 1.0) + FLOOR**2), 0.0)
-
-    splines = basis.first, basis.values
-    weight, residuals = base.copy(), np.empty(grid.shape)
-    size = basis.n_splines * n_terms
-    right = np.empty(size)
-    for cauchy in [*[CAUCHY] * 6, *[0.0] * 6, None]:
-        band = prior.copy()
-        kernels.normal_equations(*splines, phi, y, weight, band, right)
-        factor = cholesky_banded(band, overwrite_ab=True, lower=True, check_finite=False), True
-        solution = cho_solve_banded(factor, right, check_finite=False).reshape(-1, n_terms)
-        if cauchy is None:
-            break
-        spread = kernels.scaled_residuals(*splines, phi, solution, y, base, residuals)
-        kernels.reweight(residuals, base, max(spread, 1.0), cauchy, TUKEY, weight)
-    covariance = cho_solve_banded(factor, np.eye(size), overwrite_b=True, check_finite=False)
-    shape = (basis.n_splines, n_terms)
-    return Contour(grid, basis, solution, np.ascontiguousarray(covariance).reshape(*shape, *shape))
+    starts, column, y, weight = kernels.list_cells(height, variance, inner_rows(grid), FLOOR)
+    band, coefficients = np.empty_like(prior), np.empty((basis.n_splines, n_terms))
+    kernels.fit_robustly(
+        basis.first, basis.values, phi, starts, column, y, weight, prior,
+        CAUCHY, TUKEY, N_ROUNDS, CHANGE, band, coefficients,
+    )  # fmt: skip
+    return Contour(grid, basis, coefficients, band)
 
 
 def _prior_band(
     grid: Grid, n_splines: int, n_terms: int, knot_diameters: float, constant_radius: bool
 ) -> Array:
-    """Inverse variances of the levels and of the steps from knot to knot, as a lower band."""
+    """Inverse variances of the levels and of the steps from knot to knot, as a lower band.
+
+    By columns from the diagonal down.
+    """
     interval = grid.length / (n_splines - 3)
     walk = WALK_PRIOR * grid.radius * np.sqrt(interval / (4 * grid.radius))
     n_steps = np.full(n_splines, 2.0)
     n_steps[[0, -1]] = 1.0
-    band = np.zeros((4 * n_terms, n_splines * n_terms))
+    band = np.zeros((n_splines * n_terms, 4 * n_terms))
     for k in range(n_terms):
         # A radius held constant leaves the centre well known: it needs no prior to speak of.
         freedom = (1e-3 if k == 0 else 10.0) if constant_radius else 1.0
         precision = 1.0 / (walk * freedom) ** 2
-        band[0, k::n_terms] = n_steps * precision
-        band[0, k::n_terms] += 1.0 / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
-        band[n_terms, k : -n_terms or None : n_terms] = -precision
+        band[k::n_terms, 0] = n_steps * precision
+        band[k::n_terms, 0] += 1.0 / (n_splines * (LEVEL_PRIOR * grid.radius) ** 2)
+        band[k : -n_terms or None : n_terms, n_terms] = -precision
     return band
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from pipecore.deformation.bump import bump_shape, cone, fit_bump, frustum
 from pipecore.deformation.deviation_map import Grid, close_holes, group_median
-from pipecore.deformation.matched_filter import find_candidates
+from pipecore.deformation.matched_filter import MatchedFilter
 from pipecore.deformation.ovality import runs
 from pipecore.deformation.reference import fit_contour
 from pipecore.deformation.strain import dent_strain
@@ -101,16 +101,8 @@ def test_that_pure_noise_has_no_candidates_at_six_sigma(rng):
     g = grid(length=20.0, rows=2000)
     count = rng.poisson(1.0, g.shape).astype(float)
     noise = rng.normal(size=g.shape) * 0.002 / np.sqrt(np.maximum(count, 1))
-    found = find_candidates(
-        g,
-        deviation=np.where(count > 0, noise, np.nan),
-        weight=count / 0.002**2,
-        count=count,
-        contour_sd=np.zeros(g.shape),
-        allowed=np.ones(g.shape, bool),
-        threshold=6.0,
-    )
-    assert found == []
+    bumps = MatchedFilter.of(g, count / 0.002**2, count, np.ones(g.shape, bool))
+    assert bumps.find(np.where(count > 0, noise, np.nan), np.zeros(g.shape), 6.0) == []
 
 
 def test_that_medians_of_groups_are_those_of_numpy(rng):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy import ndimage
 from scipy.interpolate import RegularGridInterpolator
 
 from pipecore._kernels import maps
@@ -39,3 +40,27 @@ def test_that_the_strongest_of_the_free_cells_is_found(rng):
     assert free.ravel()[place]
     assert abs(z.ravel()[place]) == most
     assert maps.strongest(z, np.zeros_like(free)) == (0.0, 0)
+
+
+@pytest.mark.parametrize("taps", [(3, 5), (7, 1), (21, 25)])
+def test_that_correlations_are_scipys(rng, taps):
+    table = rng.normal(size=(8, 11))
+    along, around = (rng.normal(size=n) for n in taps)
+    found = np.empty(table.shape)
+    maps.correlate(table, along, around, found)
+    expected = ndimage.correlate1d(table, along, axis=0, mode="constant")
+    assert_allclose(found, ndimage.correlate1d(expected, around, axis=1, mode="wrap"), atol=1e-12)
+
+
+def test_that_heights_are_scored_by_their_noise(rng):
+    pull, contour_sd = rng.normal(size=(2, 8, 11))
+    precision = rng.uniform(1, 3, (8, 11))
+    is_told, allowed = rng.random((2, 8, 11)) < 0.8
+    height, z = pull.copy(), np.empty((8, 11))
+    spread = maps.score(height, precision, is_told, contour_sd, allowed, z)
+    assert_allclose(height[is_told], (pull / precision)[is_told])
+    expected = np.where(is_told, height / np.hypot(precision**-0.5, contour_sd), 0.0)
+    assert_allclose(z, expected)
+    assert spread == pytest.approx(1.4826 * np.median(np.abs(z[is_told & allowed])))
+    allowed[2:] = False
+    assert maps.score(pull.copy(), precision, is_told, contour_sd, allowed, z) == 1.0
