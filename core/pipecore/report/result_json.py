@@ -5,9 +5,9 @@ coordinates in metres, and world coordinates in the file's unit are
 ``(local + origin) / metres_per_unit``. ``null`` stands for what could not be measured.
 A kind of axis has its own keys: ``line`` has start, direction and length, ``arc`` has
 centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
-length. ``settings`` are those of the detection, ``own_settings`` those of elements that
-were detected again with others, by element id. A reader refuses a larger
-`format_version`; keys may be added within a version.
+length, with nine digits after the point. ``settings`` are those of the detection,
+``own_settings`` those of elements that were detected again with others, by element id. A
+reader refuses a larger `format_version`; keys may be added within a version.
 """
 
 import dataclasses
@@ -28,6 +28,8 @@ from pipecore.types import Result
 
 FORMAT = "pipecore result"
 FORMAT_VERSION = 1
+DECIMALS = 9
+"""Of the values of profiles: nanometres. Sixteen take nearly twice the time and room."""
 
 
 def result_to_dict(result: Result) -> dict[str, Any]:
@@ -52,7 +54,10 @@ def result_to_dict(result: Result) -> dict[str, Any]:
         "own_settings": {str(i): s.to_dict() for i, s in result.own_settings.items()},
         "stacks": _plain(result.stacks),
         "elements": _plain(result.elements),
-        "profiles": _plain(result.profiles),
+        "profiles": {
+            f.name: _plain(np.round(getattr(result.profiles, f.name), DECIMALS))
+            for f in dataclasses.fields(result.profiles)
+        },
         "deformations": _plain(result.deformations),
     }
 
