@@ -2,7 +2,9 @@
 
 import logging
 import os
+import time
 from collections.abc import Callable, Iterator, Sequence
+from concurrent import futures as concurrent
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.2
 """Progress is reported, and cancelling noticed, at least this often, seconds."""
+ALONE = 20.0
+"""A cluster may be without workers for so long, seconds: lost ones are started again."""
 _CONNECT_TIMEOUT = "5s"
 _CALM = {
     "distributed.worker.profile.enabled": False,
@@ -24,6 +28,8 @@ _CALM = {
     "distributed.admin.system-monitor.interval": "5s",
 }
 """dask looks at its own threads so often that this costs 3 % of a core."""
+_NO_ANSWER = "The dask cluster no longer answers (tiling.scheduler); nothing was written."
+_NO_WORKERS = "All workers of the dask cluster were lost; nothing was written."
 _ANY_PORT = "127.0.0.1:0"
 
 
@@ -50,7 +56,11 @@ class Engine:
         """Whether all workers can read these files."""
         if self._is_local:
             return True
-        return all(self._client.run(can_read, [path.absolute() for path in paths]).values())
+        try:
+            can_see = self._client.run(can_read, [path.absolute() for path in paths])
+        except OSError as error:
+            raise PipecoreError(_NO_ANSWER) from error
+        return all(can_see.values())
 
     def run(
         self,
@@ -62,14 +72,16 @@ class Engine:
     ) -> list[Any]:
         """Call `work(store, *tile)` for every tile and return the results in their order.
 
-        What a tile returns must be small; what is large it writes to the store.
+        What a tile returns must be small; what is large it writes to the store. If a worker
+        is lost, others do its tiles again.
 
         Raises
         ------
         CancelledError
             From `progress`; tiles that have begun end soon.
         PipecoreError
-            From a tile, or if a worker is lost.
+            From a tile, if it ends one worker after the other, or if there is no worker or
+            no scheduler any more.
         """
         from distributed import wait  # noqa: PLC0415
         from distributed.scheduler import KilledWorker  # noqa: PLC0415
@@ -78,6 +90,7 @@ class Engine:
         progress.update(stage, begin)
         futures = [self._client.submit(work, self.store, *tile, pure=False) for tile in tiles]
         pending = set(futures)
+        company, results = _Company(self._client), {}
         try:
             while pending:
                 try:
@@ -85,20 +98,44 @@ class Engine:
                 except TimeoutError:
                     done = set()
                 for future in done:
-                    if future.status == "error":
-                        future.result()
+                    results[future] = future.result()
+                if not (done or self._is_local):
+                    company.check()
                 share = 1.0 - len(pending) / max(len(futures), 1)
                 progress.update(stage, begin + (end - begin) * share)
-            return [future.result() for future in futures]
+            return [results[future] for future in futures]
         except KilledWorker as error:
             raise PipecoreError(
                 "A worker of the dask cluster was lost, most likely for want of memory; lower "
                 "the memory limit (tiling.memory_gib) to make tiles smaller."
             ) from error
+        except concurrent.CancelledError as error:
+            raise PipecoreError(_NO_ANSWER) from error
         except BaseException:
             self.store.give_up()
             self._client.cancel(futures)
             raise
+
+
+class _Company:
+    """Looks whether a cluster still has workers."""
+
+    def __init__(self, client: "Client") -> None:
+        self._client = client
+        self._seen = self._looked = time.monotonic()
+
+    def check(self) -> None:
+        """Raise `PipecoreError` if it has had none for too long; ask once a second."""
+        now = time.monotonic()
+        if now - self._looked < min(1.0, ALONE):
+            return
+        self._looked = now
+        # Nothing is told while there is no connection.
+        workers = self._client.scheduler_info(n_workers=-1).get("workers")
+        if workers:
+            self._seen = now
+        elif now - self._seen > ALONE:
+            raise PipecoreError(_NO_ANSWER if workers is None else _NO_WORKERS)
 
 
 @contextmanager
@@ -113,8 +150,8 @@ def start_engine(scheduler: str, store: Store) -> Iterator[Engine]:
     import dask  # noqa: PLC0415
     from distributed import Client, LocalCluster  # noqa: PLC0415
 
-    for name in ("distributed", "distributed.worker", "distributed.scheduler"):
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in ("", ".worker", ".scheduler", ".client"):
+        logging.getLogger(f"distributed{name}").setLevel(logging.CRITICAL)
     with dask.config.set({"distributed.comm.timeouts.connect": _CONNECT_TIMEOUT} | _CALM):
         if not scheduler:
             n_threads = parallel.threads()
@@ -157,6 +194,8 @@ def _check_workers(client: "Client", scheduler: str, store: Store) -> int:
         can_use = client.run(check_access, store)
     except CancelledError:
         raise
+    except OSError as error:
+        raise PipecoreError(_NO_ANSWER) from error
     except Exception as error:
         raise SettingsError(
             "The workers of “{scheduler}” cannot run pipecore; install the same version there.",

@@ -3,26 +3,22 @@
 import errno
 import itertools
 import os
-import socket
 import time
 
 import numpy as np
 import psutil
 import pytest
-from distributed import LocalCluster
 from numpy.testing import assert_array_equal
 
 from pipecore import io
-from pipecore.errors import SettingsError, WriteError
+from pipecore.errors import WriteError
 from pipecore.geometry import LineAxis
 from pipecore.io import mapped
 from pipecore.io.mapped import drop_pages
-from pipecore.pipeline import detect
 from pipecore.progress import NoProgress
 from pipecore.settings import Settings, TilingSettings
 from pipecore.surface import WIDEST_NEIGHBOURHOOD, average_voxels, fit_planes
 from pipecore.tiling import detect_in_tiles, estimate_need, memory
-from pipecore.tiling.engine import start_engine
 from pipecore.tiling.memory import BASE_BYTES, GIB, ONE_PIECE_BYTES, keeping_within, tile_bytes
 from pipecore.tiling.quantile import quantile
 from pipecore.tiling.store import temporary_store
@@ -188,27 +184,3 @@ def test_that_tiles_of_several_workers_share_the_limit():
     alone, shared = (tile_bytes(10**7, 4 * GIB, n) for n in (1, 4))
     assert alone == pytest.approx(4 * shared, rel=1e-6)
     assert BASE_BYTES + 4 * shared < 4 * GIB
-
-
-def test_that_a_cluster_by_its_address_finds_the_same(scanned, tmp_path):
-    expected = detect(io.read(scanned), Settings())
-    assert len(expected.elements) >= 1
-    with LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", host="127.0.0.1"
-    ) as cluster:
-        settings = Settings(
-            tiling=TilingSettings(tile_mpoints=0.004, scheduler=cluster.scheduler_address)
-        )
-        with detect_in_tiles([scanned], settings, folder=tmp_path) as (_, found):
-            assert_array_equal(found.element_id, expected.element_id)
-            assert_array_equal(found.segment_id, expected.segment_id)
-            assert_array_equal(found.deviation, expected.deviation)
-            assert [e.radius for e in found.elements] == [e.radius for e in expected.elements]
-
-
-def test_that_a_scheduler_that_does_not_answer_is_told(scanned, tmp_path):
-    with socket.socket() as taken, temporary_store(tmp_path) as store:
-        taken.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
-        with pytest.raises(SettingsError, match=address), start_engine(address, store):
-            pytest.fail("nobody is there")
