@@ -10,7 +10,6 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import CellGrid, cells_of
-from pipecore.surface.planes import planes_of_points
 from pipecore.surface.spacing import median_spacing
 from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
 from pipecore.types import PointCloud
@@ -24,7 +23,6 @@ __all__ = [
     "estimate_normals",
     "fit_planes",
     "median_spacing",
-    "planes_of_points",
     "sample_surface",
     "thin",
 ]
