@@ -3,7 +3,7 @@
 >>> from pipecore.report import write_report
 >>> write_report("report", cloud, result)
 
-Importing this package imports neither the page's template engine nor the LAZ writer.
+Importing this package imports neither the plot library nor the LAZ writer.
 """
 
 import os
@@ -129,7 +129,7 @@ def write_html(
 ) -> None:
     """Write the report as one HTML page; errors as for `write_report`."""
     progress = progress or NoProgress()
-    progress.update("drawing figures", 0.0)  # importing what fills the page takes a moment
+    progress.update("drawing figures", 0.0)  # importing what draws them takes a while
     from pipecore.report.html import render_html  # noqa: PLC0415
 
     page = render_html(cloud, result, progress)

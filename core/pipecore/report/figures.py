@@ -4,20 +4,16 @@ Left the radius along the element; right what shows the kind best: the unrolled 
 dent or bulge, the section of an ovality, the path of the centres of a bow or kink.
 """
 
+import io
+from typing import Any
+
+import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pipecore.report.format import MINUS, format_clock
-from pipecore.report.panel import (
-    BLUE,
-    GREY,
-    INK,
-    VERMILION,
-    Limits,
-    Panel,
-    figure,
-    limits_of,
-)
+from pipecore.report.format import format_clock
 from pipecore.types import (
     OWN_STACK,
     Array,
@@ -28,11 +24,28 @@ from pipecore.types import (
     Result,
 )
 
-WIDTH, HEIGHT = 533.0, 166.0
-LEFT = (34.0, 18.0, 234.0, 116.0)
-RIGHT = (306.0, 18.0, 187.0, 116.0)
-COLOUR_BAR = (506.0, 18.0, 6.0, 116.0)
-"""Left, top, width and height of the panels, points."""
+INK = "#333333"
+BLUE, VERMILION, GREY = "#0072B2", "#D55E00", "#8a8a8a"
+STYLE: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "axes.titlesize": 8.0,
+    "axes.titlelocation": "left",
+    # Text stays text (searched, in the page's font), ids are the same in every run.
+    "svg.fonttype": "none",
+    "svg.hashsalt": "pipecore",
+}
+RIGHT = (0.57, 0.19, 0.35, 0.70)
+COLOUR_BAR = (0.93, 0.19, 0.012, 0.70)
 
 FINEST_CELLS_AROUND = 60
 POINTS_PER_CELL = 6
@@ -50,51 +63,55 @@ def draw_deformation(
     `rows` are those of the cloud's points that are the element's.
     """
     element = result.element(deformation.element_id)
-    panels = [_draw_radius(deformation, element, result)]
-    if deformation.kind in (DeformationKind.BOW, DeformationKind.KINK):
-        panels.append(_draw_centres(deformation, element, result))
-    else:
-        points = _points_of(element, cloud, result, rows)
-        if deformation.kind is DeformationKind.OVALITY:
-            panels.append(_draw_section(deformation, element, points))
+    points = _points_of(element, cloud, result, rows)
+    with mpl.rc_context(STYLE):
+        # Places by hand: a layout engine takes as long as all the drawing.
+        figure = Figure(figsize=(7.4, 2.3))
+        left, right = figure.add_axes((0.06, 0.19, 0.44, 0.70)), figure.add_axes(RIGHT)
+        left.patch.set_visible(False)
+        _draw_radius(left, deformation, element, result)
+        if deformation.kind in (DeformationKind.DENT, DeformationKind.BULGE):
+            _draw_map(right, deformation, element, points)
+        elif deformation.kind is DeformationKind.OVALITY:
+            _draw_section(right, deformation, element, points)
         else:
-            panels += _draw_map(deformation, element, points)
-    return figure(WIDTH, HEIGHT, panels, f"{deformation.kind} on {element.label}")
+            _draw_centres(right, deformation, element, result)
+        text = io.StringIO()
+        figure.savefig(text, format="svg", facecolor="none", metadata={"Date": None})
+    svg = text.getvalue()
+    return svg[svg.index("<svg") :]
 
 
-def _along(element: Element) -> Limits:
-    """Limits of a panel whose x is the chainage."""
-    room = 0.03 * element.axis.length
-    return -room, element.axis.length + room
+def _mark_extent(axes: Axes, deformation: Deformation) -> None:
+    axes.axvspan(
+        deformation.chainage_start, deformation.chainage_end, color=VERMILION, alpha=0.12, lw=0
+    )
+    axes.axvline(deformation.chainage, color=VERMILION, lw=0.8)
 
 
-def _mark_extent(panel: Panel, deformation: Deformation) -> None:
-    panel.band(deformation.chainage_start, deformation.chainage_end, VERMILION)
-    panel.vertical(deformation.chainage, VERMILION)
-
-
-def _draw_radius(deformation: Deformation, element: Element, result: Result) -> Panel:
+def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
     profiles = result.profiles.of_element(element.element_id, OWN_STACK)
+    _mark_extent(axes, deformation)
     chainage = np.linspace(0, element.axis.length, 50)
-    fitted = 1000 * np.asarray(element.radius_at(chainage))
-    minor, sd = 1000 * profiles.semi_minor, 1000 * np.nan_to_num(profiles.semi_minor_sd)
-    panel = Panel(
-        LEFT,
-        _along(element),
-        limits_of(fitted, minor - sd, minor + sd, margin=0.25),
-        title=f"{element.label}: radius (mm)",
-        x_label="chainage (m)",
+    axes.plot(chainage, 1000 * element.radius_at(chainage), color=GREY, lw=1.0, label="fitted")
+    axes.plot(
+        *broken_at_gaps(profiles.chainage, 1000 * profiles.semi_minor),
+        color=BLUE,
+        lw=0.8,
     )
-    _mark_extent(panel, deformation)
-    panel.line(chainage, fitted, GREY, 1.0)
-    panel.line(*broken_at_gaps(profiles.chainage, minor), BLUE, 0.8)
-    panel.bars(profiles.chainage, minor - sd, minor + sd, INK)
-    panel.points(profiles.chainage, minor, INK, 2.1)
-    is_at_the_start = deformation.chainage < 0.5 * element.axis.length
-    panel.legend(
-        [("fitted", GREY, 1.0), ("semi-minor axis ± sd", INK, 2.1)], is_on_the_right=is_at_the_start
+    axes.errorbar(
+        profiles.chainage,
+        1000 * profiles.semi_minor,
+        yerr=1000 * np.nan_to_num(profiles.semi_minor_sd),
+        fmt=".",
+        ms=2.5,
+        color=INK,
+        elinewidth=0.5,
+        label="semi-minor axis ± sd",
     )
-    return panel
+    axes.set(xlabel="chainage (m)", title=f"{element.label}: radius (mm)")
+    axes.legend(frameon=False, fontsize=7, ncols=3, handlelength=1.2, columnspacing=1.0)
+    axes.margins(y=0.25)
 
 
 def broken_at_gaps(chainage: Array, values: Array) -> tuple[Array, Array]:
@@ -119,8 +136,7 @@ def _points_of(
     return chainage, clock, np.asarray(result.deviation[rows], np.float64)
 
 
-def _draw_map(deformation: Deformation, element: Element, points: Points) -> list[Panel]:
-    """The map, and the bar that tells its colours."""
+def _draw_map(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
     chainage, clock, deviation = points
     reach = (deformation.chainage_end - deformation.chainage_start) / 2 + 2 * element.radius
     low = max(0.0, deformation.chainage - reach)
@@ -130,34 +146,31 @@ def _draw_map(deformation: Deformation, element: Element, points: Points) -> lis
     around = np.mod(clock - middle + np.pi, 2 * np.pi) - np.pi
     valid = np.isfinite(deviation) & (chainage >= low) & (chainage <= high)
     n_around = _cells_around(int(valid.sum()), high - low, element)
-    shape = n_around, max(1, round((high - low) * n_around / (2 * np.pi * element.radius)))
-    row = _cells_of(around[valid], -np.pi, np.pi, shape[0])
-    cell = row * shape[1] + _cells_of(chainage[valid], low, high, shape[1])
-    count = np.bincount(cell, minlength=shape[0] * shape[1]).reshape(shape)
-    total = np.bincount(cell, deviation[valid], shape[0] * shape[1]).reshape(shape)
+    cell = 2 * np.pi * element.radius / n_around
+    where: dict[str, Any] = {
+        "bins": [max(1, round((high - low) / cell)), n_around],
+        "range": [[low, high], [-np.pi, np.pi]],
+    }
+    count = np.histogram2d(chainage[valid], around[valid], **where)[0]
+    total = np.histogram2d(chainage[valid], around[valid], weights=deviation[valid], **where)[0]
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
     limit = float(np.ceil(1000 * _drawn_depth(deformation)))
-    panel = Panel(
-        RIGHT,
-        (low, high),
-        (np.pi, -np.pi),
-        title="deviation (mm), unrolled; blue inward, red outward",
-        x_label="chainage (m)",
-        y_ticks=_clock_ticks(middle),
+    axes.set_facecolor("#eeeeee")  # holes stay holes
+    image = axes.imshow(
+        1000 * mean.T,
+        extent=(low, high, np.pi, -np.pi),
+        aspect="auto",
+        cmap="RdBu_r",
+        vmin=-limit,
+        vmax=limit,
+        interpolation="nearest",
     )
-    panel.cells(1000 * mean, limit)
-    panel.cross(deformation.chainage, 0.0, "black")
-    ticks = [(value, f"{value:.0f}".replace("-", MINUS)) for value in (-limit, 0.0, limit)]
-    bar = Panel(COLOUR_BAR, (0.0, 1.0), (-limit, limit), y_ticks=ticks, is_on_the_right=True)
-    bar.cells(np.linspace(limit, -limit, 64)[:, None], limit)
-    return [panel, bar]
-
-
-def _cells_of(values: Array, low: float, high: float, n: int) -> NDArray[np.intp]:
-    """Which of n equal cells values between two limits are in."""
-    share = (values - low) / (high - low)
-    return np.minimum(np.floor(share * n), n - 1).astype(np.intp)
+    axes.plot(deformation.chainage, 0, "+", color="black", ms=7, mew=1.0)
+    axes.set(xlabel="chainage (m)", title="deviation (mm), unrolled; blue inward, red outward")
+    _set_clock_ticks(axes, middle)
+    figure = axes.figure
+    figure.colorbar(image, cax=figure.add_axes(COLOUR_BAR), ticks=[-limit, 0, limit])
 
 
 def _cells_around(n_points: int, length: float, element: Element) -> int:
@@ -167,13 +180,13 @@ def _cells_around(n_points: int, length: float, element: Element) -> int:
     return int(np.clip(2 * np.pi * element.radius / cell, 12, FINEST_CELLS_AROUND))
 
 
-def _clock_ticks(middle: float) -> list[tuple[float, str]]:
+def _set_clock_ticks(axes: Axes, middle: float) -> None:
     hours = np.arange(0, 2 * np.pi, np.pi / 2)
     ticks = np.mod(hours - middle + np.pi, 2 * np.pi) - np.pi
-    return [(at, format_clock(hour)) for at, hour in zip(ticks.tolist(), hours, strict=True)]
+    axes.set_yticks(ticks, [format_clock(hour) for hour in hours])
 
 
-def _draw_section(deformation: Deformation, element: Element, points: Points) -> Panel:
+def _draw_section(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
     chainage, clock, deviation = points
     half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
     near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
@@ -183,29 +196,21 @@ def _draw_section(deformation: Deformation, element: Element, points: Points) ->
     exaggeration = max(1, round(radius / 5 / _drawn_depth(deformation)))
     circle = np.linspace(0, 2 * np.pi, 181)
 
-    def drawn(at: Array, departure: Array | float) -> tuple[Array, Array]:
-        r = 1000 * (radius + exaggeration * np.asarray(departure))
-        return np.asarray(r * np.sin(at)), np.asarray(r * np.cos(at))
+    def draw(at: Array, departure: Array | float, *style: str, **look: Any) -> None:
+        r = 1000 * (radius + exaggeration * departure)
+        axes.plot(r * np.sin(at), r * np.cos(at), *style, **look)
 
-    oval = np.zeros_like(circle)
+    draw(circle, 0.0, color=GREY, lw=1.0)
     if np.isfinite(deformation.depth) and np.isfinite(deformation.clock):
         oval = deformation.depth * np.cos(2 * (circle - deformation.clock))
-    round_one, oval_one, seen = drawn(circle, 0.0), drawn(circle, oval), drawn(angle, mean)
-    shapes = np.concatenate([*round_one, *oval_one, *seen])
-    most = 1.12 * float(np.abs(shapes).max())
-    side = RIGHT[3]
-    panel = Panel(
-        (RIGHT[0] + (RIGHT[2] - side) / 2, RIGHT[1], side, side),
-        (-most, most),
-        (-most, most),
+        draw(circle, oval, color=BLUE, lw=1.0)
+    draw(angle, mean, ".", ms=3, color=INK)
+    axes.set_aspect("equal")
+    axes.margins(0.12)
+    axes.set(
+        xlabel="mm",
         title=f"section, 12:00 up, deviations × {exaggeration}",
-        x_label="mm",
     )
-    panel.line(*round_one, GREY, 1.0)
-    if oval.any():
-        panel.line(*oval_one, BLUE, 1.0)
-    panel.points(*seen, INK, 2.4)
-    return panel
 
 
 def _means_around(clock: Array, deviation: Array) -> tuple[Array, Array]:
@@ -218,17 +223,10 @@ def _means_around(clock: Array, deviation: Array) -> tuple[Array, Array]:
     return middle[seen], total[seen] / count[seen]
 
 
-def _draw_centres(deformation: Deformation, element: Element, result: Result) -> Panel:
+def _draw_centres(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
     profiles = result.profiles.of_element(element.element_id, OWN_STACK)
-    distance = 1000 * profiles.centre_deviation
-    panel = Panel(
-        RIGHT,
-        _along(element),
-        (0.0, limits_of(distance, margin=0.08)[1]),
-        title="distance of the centres from the axis (mm)",
-        x_label="chainage (m)",
-    )
-    _mark_extent(panel, deformation)
-    panel.line(*broken_at_gaps(profiles.chainage, distance), INK, 0.6)
-    panel.points(profiles.chainage, distance, INK, 2.4)
-    return panel
+    _mark_extent(axes, deformation)
+    path = broken_at_gaps(profiles.chainage, 1000 * profiles.centre_deviation)
+    axes.plot(*path, ".-", ms=3, lw=0.6, color=INK)
+    axes.set(xlabel="chainage (m)", title="distance of the centres from the axis (mm)")
+    axes.set_ylim(bottom=0)

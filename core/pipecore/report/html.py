@@ -15,7 +15,6 @@ from pipecore._kernels.grouping import group_by_label
 from pipecore.allocation import BLOCK
 from pipecore.geometry import ArcAxis
 from pipecore.progress import NoProgress, Progress
-from pipecore.report.figures import draw_deformation
 from pipecore.report.format import (
     NOT_MEASURABLE,
     format_clock,
@@ -258,6 +257,9 @@ def _figures(
     ordered = by_verdict(result)
     if not ordered:
         return []
+    # The plot library takes a while to import: only where something is drawn.
+    from pipecore.report.figures import draw_deformation  # noqa: PLC0415
+
     figures: dict[int, dict[str, Any]] = {}
     for element_ids in _portions(result, {d.element_id for d in ordered}):
         rows = _rows_of_elements(result, element_ids)

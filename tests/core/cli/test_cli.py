@@ -42,6 +42,8 @@ def detections(monkeypatch) -> list[Settings]:
         return replace(result, settings=settings, origin=cloud.origin)
 
     monkeypatch.setattr("pipecore.cli.detect.detect", detect)
+    # Figures take most of a report's time, and have their own tests.
+    monkeypatch.setattr("pipecore.report.figures.draw_deformation", lambda *_: "<svg></svg>")
     return calls
 
 
