@@ -163,6 +163,13 @@ def refine_piece(
         own = near.own[within]
         if is_final:
             told = partial(Fitted, axis=axis, own=own, extent=extent, misfit=misfit)
+            assert fitted is not None
+            # All but the fit itself is as it will be at last.
+            if (
+                not is_promising(told(fitted.fit), HARDLY_ROUGH)
+                and _off_bands(fitted.fit, chosen, nearby, near.spacing) is None
+            ):
+                return None
             fit = fit_measured(
                 model, chosen, nearby, 3.0 * sigma, near.spacing,
                 partial(_holds, is_promising, told),
