@@ -255,7 +255,7 @@ def _fit_sample(
     model: AnySurface, points: Array, scale: float, n_all: int
 ) -> SurfaceFit[Any] | None:
     """Fit the model to a sample; it is as sure of it as `n_all` points would be."""
-    fit = fit_surface(model, points, scale)
+    fit = fit_surface(model, points, scale, is_rough=True)
     if fit is None or not _is_still(fit, model):
         return None
     return replace(fit, covariance=fit.covariance * min(len(points) / n_all, 1.0))

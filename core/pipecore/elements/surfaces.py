@@ -11,12 +11,15 @@ from typing import ClassVar, Generic, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import fitting
 from pipecore._kernels import surfaces as kernels
 from pipecore.geometry import ArcAxis, LineAxis, unit
 
 Array = NDArray[np.float64]
 
 
+CONVERGED, ROUGHLY = 1e-6, 2e-5
+"""A fit ends when no point's distance changes by more than this, metres; a rough one earlier."""
 NORMAL_STEPS = np.array([-2.334, -0.742, 0.742, 2.334]), np.array([0.0459, 0.4541, 0.4541, 0.0459])
 """Nodes and weights of Gauss and Hermite's quadrature for the standard normal distribution."""
 ONE_SIDED = 0.55
@@ -212,9 +215,17 @@ def robust_sigma(residuals: Array) -> float:
 
 
 def fit_surface(
-    model: Model, xyz: Array, scale: float, n_iterations: int = 30
+    model: Model, xyz: Array, scale: float, n_iterations: int = 30, *, is_rough: bool = False
 ) -> SurfaceFit[Model] | None:
     """Fit a surface to points by Gauss-Newton with Tukey's weights.
+
+    A point that is moved by noise along the laser's beam moves across the surface and along
+    it at once, so that its distance from the surface and the place where that is counted go
+    together. On a pipe seen from one side the fitted radius is too small by about σ²/r for
+    it, however many points there are. So points on the surface are moved along the beam,
+    and what that adds to the normal equations, in the mean over normal noise by Gauss and
+    Hermite's quadrature, is taken off. The beam is the mean direction in which the surface
+    faces; where the surface is seen all round, the effect cancels and nothing is done.
 
     Parameters
     ----------
@@ -224,6 +235,8 @@ def fit_surface(
     scale : float
         First guess of the points' standard deviation; it shrinks to what they show.
     n_iterations : int
+    is_rough : bool
+        Whether the last hundredths of a millimetre do not matter.
 
     Returns
     -------
@@ -231,56 +244,10 @@ def fit_surface(
         None where the points do not carry the surface.
     """
     kind, numbers = model.kind, model.numbers()
-    scale = kernels.fit_robustly(kind, numbers, xyz, scale, n_iterations)
-    if not scale > 0:
-        return None
-    reach = kernels.TUKEY * scale
     p = kernels.n_parameters(kind)
-    # Huber's covariance of an M-estimator; points need not all scatter alike.
-    information, scatter, beam = np.empty((p, p)), np.empty((p, p)), np.empty(3)
-    n, sigma = kernels.judge_fit(kind, numbers, xyz, reach, information, scatter, beam)
-    if n < 3 * p:
-        return None
-    inverse = np.linalg.pinv(information)
-    kernels.move(kind, numbers, inverse @ _beam_pull(kind, numbers, xyz, reach, beam, p))
-    return SurfaceFit(model.from_numbers(numbers), inverse @ scatter @ inverse, sigma, n)
-
-
-def _beam_pull(
-    kind: int, numbers: Array, xyz: Array, reach: float, facing: Array, n_parameters: int
-) -> Array:
-    """What noise along the laser's beam adds to the normal equations, on average.
-
-    A point that is moved along its beam moves across the surface and along it at once, so
-    that its distance from the surface and the place where that is counted go together. On a
-    pipe seen from one side the fitted radius is too small by about σ²/r for it, however
-    many points there are. Here points on the surface are moved along the beam, and the
-    mean is taken over normal noise by Gauss and Hermite's quadrature. The beam is the mean
-    direction in which the surface faces; where the surface is seen all round, the effect
-    cancels and nothing is done.
-
-    Parameters
-    ----------
-    kind : int
-    numbers : ndarray
-        The surface as the kernels take it.
-    xyz : ndarray, shape (n, 3)
-    reach : float
-        Distance from which on points do not count, metres.
-    facing : ndarray, shape (3,)
-        Mean of the surface's normals at the points.
-    n_parameters : int
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        Σ Jᵀ·residual, to be taken off.
-    """
-    pull = np.zeros(n_parameters)
-    one_sidedness = float(np.linalg.norm(facing))
-    if one_sidedness >= ONE_SIDED:
-        beam = facing / one_sidedness
-        noise = kernels.noise_along(kind, numbers, xyz, reach, beam)
-        steps, shares = NORMAL_STEPS
-        kernels.pull_along(kind, numbers, xyz, reach, beam, steps * noise, shares, pull)
-    return pull
+    covariance = np.empty((p, p))
+    converged, one_sided = (ROUGHLY, np.inf) if is_rough else (CONVERGED, ONE_SIDED)
+    n, sigma = fitting.fit_surface(
+        kind, numbers, xyz, scale, n_iterations, converged, one_sided, *NORMAL_STEPS, covariance
+    )
+    return SurfaceFit(model.from_numbers(numbers), covariance, sigma, n) if n else None

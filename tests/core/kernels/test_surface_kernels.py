@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore._kernels import axes, nearby, surfaces
+from pipecore._kernels import axes, fitting, nearby, surfaces
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.geometry import ArcAxis, LineAxis, unit
@@ -79,7 +79,7 @@ def test_that_normal_equations_are_the_weighted_sums(rng, kind):
     xyz, reach = near_points(rng, model), 0.008
     p = surfaces.n_parameters(kind)
     residuals, normal, right = np.empty(len(xyz)), np.empty((p, p)), np.empty(p)
-    n = surfaces.weighted_normal_equations(
+    n = fitting.weighted_normal_equations(
         kind, model.numbers(), xyz, reach, residuals, normal, right
     )
     residual, slopes, _ = model.residuals(xyz)
@@ -88,13 +88,13 @@ def test_that_normal_equations_are_the_weighted_sums(rng, kind):
     assert_allclose(residuals, residual)
     assert_allclose(normal, slopes.T @ (weight[:, None] * slopes), atol=1e-12)
     assert_allclose(right, slopes.T @ (weight * residual), atol=1e-12)
-    assert surfaces.spread_within(residual, reach) == pytest.approx(
+    assert fitting.spread_within(residual, reach) == pytest.approx(
         1.4826 * np.median(np.abs(residual[weight > 0]))
     )
     step = 1e-3 * rng.normal(size=p)
     largest = np.abs(slopes @ step).max()
-    assert surfaces.moves_less(kind, model.numbers(), xyz, step, 1.001 * largest)
-    assert not surfaces.moves_less(kind, model.numbers(), xyz, step, 0.999 * largest)
+    assert fitting.moves_less(kind, model.numbers(), xyz, step, 1.001 * largest)
+    assert not fitting.moves_less(kind, model.numbers(), xyz, step, 0.999 * largest)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -103,7 +103,7 @@ def test_that_a_fit_is_judged_by_the_sums_over_its_points(rng, kind):
     xyz, reach = near_points(rng, model), 0.008
     p = surfaces.n_parameters(kind)
     information, scatter, beam = np.empty((p, p)), np.empty((p, p)), np.empty(3)
-    n, sigma = surfaces.judge_fit(kind, model.numbers(), xyz, reach, information, scatter, beam)
+    n, sigma = fitting.judge_fit(kind, model.numbers(), xyz, reach, information, scatter, beam)
     residual, slopes, outward = model.residuals(xyz)
     used = np.abs(residual) < reach
     residual, slopes, outward = residual[used], slopes[used], outward[used]
@@ -119,11 +119,11 @@ def test_that_a_fit_is_judged_by_the_sums_over_its_points(rng, kind):
 
     beam = unit(outward[0])
     facing = outward @ beam
-    faced = facing > surfaces.FACING
-    noise = surfaces.noise_along(kind, model.numbers(), xyz, reach, beam)
+    faced = facing > fitting.FACING
+    noise = fitting.noise_along(kind, model.numbers(), xyz, reach, beam)
     assert noise == pytest.approx(1.4826 * np.median(np.abs(residual[faced] / facing[faced])))
     steps, shares, found = np.array([-0.002, 0.003]), np.array([0.4, 0.6]), np.empty(p)
-    surfaces.pull_along(kind, model.numbers(), xyz, reach, beam, steps, shares, found)
+    fitting.pull_along(kind, model.numbers(), xyz, reach, beam, steps, shares, found)
     on = xyz[used] - residual[:, None] * outward
     expected = np.zeros(p)
     for step, share in zip(steps, shares, strict=True):
@@ -137,12 +137,12 @@ def test_that_a_step_is_not_solved_for_where_the_points_carry_none(rng):
     step = np.empty(4)
     design = rng.normal(size=(20, 4))
     normal, right = design.T @ design, rng.normal(size=4)
-    assert surfaces.solve_step(normal, right, step)
+    assert fitting.solve_step(normal, right, step)
     assert_allclose(normal @ step, -right, atol=1e-9)
     design[:, 3] = design[:, 0] - design[:, 1]
-    assert not surfaces.solve_step(design.T @ design, right, step)
+    assert not fitting.solve_step(design.T @ design, right, step)
     normal[0, 0] = np.nan
-    assert not surfaces.solve_step(normal, right, step)
+    assert not fitting.solve_step(normal, right, step)
 
 
 def axes_of(rng):
