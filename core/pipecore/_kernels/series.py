@@ -41,23 +41,49 @@ def solve_in_place(normal, right):
 
 
 @njit(cache=True, nogil=True)
-def find_strays(basis, r, weight, n_rounds, tukey):
-    """Residuals from a robust fit in units of their noise, and how wide they scatter."""
-    n, p = basis.shape
+def write_normal(moments, order, normal):
+    """Write Σ w b bᵀ of the terms b up to an order, below the diagonal, from Σ w of twice as many.
+
+    2 cos a cos b = cos(a - b) + cos(a + b), and so on.
+    """
+    normal[0, 0] = moments[0]
+    for a in range(1, order + 1):
+        cos, sin = 2 * a - 1, 2 * a
+        normal[cos, 0], normal[sin, 0] = moments[cos], moments[sin]
+        for b in range(1, a + 1):
+            apart, both = 2 * (a - b) - 1, 2 * (a + b) - 1
+            cos_apart = moments[apart] if a > b else moments[0]
+            sin_apart = moments[apart + 1] if a > b else 0.0
+            normal[cos, 2 * b - 1] = 0.5 * (cos_apart + moments[both])
+            normal[sin, 2 * b] = 0.5 * (cos_apart - moments[both])
+            normal[sin, 2 * b - 1] = 0.5 * (moments[both + 1] + sin_apart)
+            normal[cos, 2 * b] = 0.5 * (moments[both + 1] - sin_apart)
+
+
+@njit(cache=True, nogil=True)
+def find_strays(waves, r, weight, n_rounds, tukey):
+    """Residuals from a robust fit in units of their noise, and how wide they scatter.
+
+    `waves` are the terms up to twice the order of the fit.
+    """
+    n = r.shape[0]
+    order = (waves.shape[1] - 1) // 4
+    p = 2 * order + 1
     freedom = max(n - p, 1) / n
-    normal, right = np.empty((p, p)), np.empty(p)
+    moments, normal, right = np.empty(waves.shape[1]), np.empty((p, p)), np.empty(p)
     residual, robust = np.empty(n), np.ones(n)
     scale = math.nan
     for _ in range(n_rounds):
-        normal[:, :] = 0.0
+        moments[:] = 0.0
         right[:] = 0.0
         for i in range(n):
             w = weight[i] * robust[i]
+            for k in range(waves.shape[1]):
+                moments[k] += w * waves[i, k]
+            w *= r[i]
             for k in range(p):
-                wk = w * basis[i, k]
-                right[k] += wk * r[i]
-                for m in range(k + 1):
-                    normal[k, m] += wk * basis[i, m]
+                right[k] += w * waves[i, k]
+        write_normal(moments, order, normal)
         # On open arcs waves look alike; a hair of ridge is enough to find who strays.
         ridge = 1e-9 * normal[0, 0]
         for k in range(p):
@@ -66,7 +92,7 @@ def find_strays(basis, r, weight, n_rounds, tukey):
         for i in range(n):
             fitted = 0.0
             for k in range(p):
-                fitted += basis[i, k] * right[k]
+                fitted += waves[i, k] * right[k]
             residual[i] = abs(r[i] - fitted) * math.sqrt(weight[i])
         scale = max(1.4826 * np.median(residual) / math.sqrt(freedom), 1e-12)
         for i in range(n):
@@ -75,27 +101,34 @@ def find_strays(basis, r, weight, n_rounds, tukey):
     return residual, scale
 
 
+@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+def inner(a, b):
+    """Sum of products, in whatever order is fast."""
+    total = 0.0
+    for i in range(a.shape[0]):
+        total += a[i] * b[i]
+    return total
+
+
 @njit(cache=True, nogil=True)
 def orthogonalise(rest, upper):
-    """Write the triangle R of a = Q R and, as its last column, Qᵀ b; `rest` is [a, b] and lost.
+    """Write the triangle R of a = Q R and, as its last column, Qᵀ b; `rest` is [a, b]ᵀ and lost.
 
     Modified Gram-Schmidt, stable with b taken along.
     """
-    n, p = rest.shape[0], rest.shape[1] - 1
+    n, p = rest.shape[1], rest.shape[0] - 1
     upper[:, :] = 0.0
     for k in range(p):
-        total = 0.0
+        unit = rest[k]
+        upper[k, k] = math.sqrt(inner(unit, unit))
         for i in range(n):
-            total += rest[i, k] * rest[i, k]
-        upper[k, k] = math.sqrt(total)
-        for i in range(n):
-            rest[i, k] /= upper[k, k]
-        for i in range(n):
-            for m in range(k + 1, p + 1):
-                upper[k, m] += rest[i, k] * rest[i, m]
-        for i in range(n):
-            for m in range(k + 1, p + 1):
-                rest[i, m] -= rest[i, k] * upper[k, m]
+            unit[i] /= upper[k, k]
+        for m in range(k + 1, p + 1):
+            other = rest[m]
+            share = inner(unit, other)
+            upper[k, m] = share
+            for i in range(n):
+                other[i] -= share * unit[i]
 
 
 @njit(cache=True, nogil=True)
@@ -184,13 +217,12 @@ def in_cells(theta, r, n_cells):
 def choose_order(rest, n_points, within, aic, upper):
     """Least order by Akaike's criterion (corrected for few points), and what it leaves.
 
-    `rest` holds the terms and the values times the roots of the weights, and is lost;
+    `rest` holds a row for each term and one for the values, times the roots of the weights,
+    and is lost;
     `upper` becomes the triangle of `orthogonalise`. Writes the criterion of each order.
     """
-    n, p = rest.shape[0], rest.shape[1] - 1
-    whole = 0.0
-    for i in range(n):
-        whole += rest[i, p] * rest[i, p]
+    p = rest.shape[0] - 1
+    whole = inner(rest[p], rest[p])
     orthogonalise(rest, upper)
     best, best_left, explained = 0, 0.0, 0.0
     for order in range(aic.shape[0]):
@@ -261,23 +293,22 @@ def fit_series(theta, r, max_order, max_gap, limits):
     if n > max_points:
         theta, r, weight, within = in_cells(theta, r, n_cells)
     n, p = theta.shape[0], 2 * order + 1
-    basis = np.empty((n, p))
+    waves = np.empty((n, 4 * order + 1))
     for i in range(n):
-        write_terms(theta[i], order, 0, basis[i])
-    residual, scale = find_strays(basis, r, weight, n_rounds, tukey)
+        write_terms(theta[i], 2 * order, 0, waves[i])
+    residual, scale = find_strays(waves, r, weight, n_rounds, tukey)
     # Weights that bend the tails of the noise would make it look smaller: all or nothing.
-    rest = np.empty((n, p + 1))
-    n_kept, n_points = 0, 0.0
-    for i in range(n):
-        if residual[i] < outlying * scale:
-            root = math.sqrt(weight[i])
-            for k in range(p):
-                rest[n_kept, k] = basis[i, k] * root
-            rest[n_kept, p] = r[i] * root
-            n_points += weight[i]
-            n_kept += 1
+    kept = np.flatnonzero(residual < outlying * scale)
+    rest, n_points = np.empty((p + 1, kept.shape[0])), 0.0
+    for j in range(kept.shape[0]):
+        i = kept[j]
+        root = math.sqrt(weight[i])
+        for k in range(p):
+            rest[k, j] = waves[i, k] * root
+        rest[p, j] = r[i] * root
+        n_points += weight[i]
     aic, upper = np.empty(order + 1), np.empty((p, p + 1))
-    chosen, left = choose_order(rest[:n_kept], n_points, within, aic, upper)
+    chosen, left = choose_order(rest, n_points, within, aic, upper)
     size = 2 * chosen + 1
     noise = math.sqrt(left / max(n_points - size, 1.0))
     inverse = inverted(upper, size)

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import leastsq
 
 from pipecore._kernels import bumps as kernels
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
+MAX_LOOKS, TOLERANCE = 60, 1e-5
+"""A fit ends after so many looks at the points, or where χ² changes by less than this share."""
+
 MIN_EXTENT, MAX_LENGTH, MAX_WIDTH = 0.1, 3.0, 1.5
 """Bounds of a bump's extents, shares of the outside diameter: beyond, it is no dent."""
 
@@ -246,7 +248,7 @@ def _fit(
     along, around, deviation, noise = data
     slack = 0.3 * np.exp(first[3:5])
 
-    n, n_free = len(along), len(first)
+    n_free = len(first)
     # Beliefs are residuals too: (slopes · p - middle).
     slopes = np.zeros((8, n_free))
     slopes[0, 0] = 1.0 / (HEIGHT_PRIOR * diameter)
@@ -258,35 +260,12 @@ def _fit(
     middle = np.zeros(8)
     middle[3:5] = np.log(TYPICAL_EXTENT * diameter) / EXTENT_PRIOR
 
-    def residuals(p: Array) -> Array:
-        result = np.empty(n + len(slopes))
-        kernels.residuals(form.number, p, along, around, deviation, noise, result[:n])
-        result[n:] = slopes @ p - middle
-        return result
-
-    def jacobian(p: Array) -> Array:
-        result = np.empty((n + len(slopes), n_free))
-        kernels.derivatives(form.number, p, along, around, noise, result[:n])
-        result[n:] = slopes
-        return result
-
-    scale = np.array([1e-3, slack[0] / 3, slack[1] / 3, 0.1, 0.1, 1e-3, 0.2])[: len(first)]
-
-    # What `least_squares` calls with method "lm", without what it does around each call.
-    p, *_ = leastsq(
-        residuals,
-        first,
-        Dfun=jacobian,
-        full_output=True,
-        ftol=1e-5,
-        xtol=1e-5,
-        gtol=1e-8,
-        maxfev=60,
-        diag=1.0 / scale,
-    )
-    left, slope = residuals(p), jacobian(p)
-    covariance = np.asarray(np.linalg.inv(slope.T @ slope), np.float64)
-    return _Fit(p, covariance, float(left @ left), form)
+    p, normal = np.empty(n_free), np.empty((n_free, n_free))
+    chi2 = kernels.fit(
+        form.number, first, along, around, deviation, noise, slopes, middle,
+        MAX_LOOKS, TOLERANCE, p, normal,
+    )  # fmt: skip
+    return _Fit(p, np.asarray(np.linalg.inv(normal), np.float64), chi2, form)
 
 
 def _thin(

@@ -1,8 +1,9 @@
-"""Bumps' residuals and derivatives, against their sections and finite differences."""
+"""Fits of bumps, against their sections, finite differences and scipy."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import least_squares
 
 from pipecore._kernels import bumps
 from pipecore.deformation.bump import BELL, CONE, FRUSTUM
@@ -20,34 +21,79 @@ def test_that_sections_are_those_of_the_forms(rng, form):
             assert height == pytest.approx(float(form.section(np.array([rho]), q)[0]))
 
 
+def residuals(form, p, data, beliefs):
+    """Of points and beliefs, as the forms' own sections give them."""
+    along, around, deviation, noise = data
+    slopes, middle = beliefs
+    rho = np.hypot(2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4]))
+    height = form.section(rho, np.exp(p[6]) if len(p) > 6 else 1.0)
+    return np.append((p[0] * height + p[5] - deviation) / noise, slopes @ p - middle)
+
+
+def made(rng, form, n_free, n=200):
+    """A noisy bump, beliefs, and its parameters."""
+    along, around = rng.uniform(-0.1, 0.1, (2, n))
+    p = np.array([0.02, 0.01, -0.005, np.log(0.12), np.log(0.1), 0.001, np.log(1.3)])[:n_free]
+    noise = rng.uniform(1e-3, 2e-3, n)
+    slopes = np.diag([10.0, 30.0, 30.0, 1.0, 1.0, 300.0, 2.0])[:n_free, :n_free]
+    beliefs = slopes, slopes @ p
+    nothing = along, around, np.zeros(n), np.ones(n)
+    height = residuals(form, p, nothing, beliefs)[:n]
+    return (along, around, height + noise * rng.normal(size=n), noise), beliefs, p
+
+
 @pytest.mark.parametrize("n_free", [6, 7])
 @pytest.mark.parametrize("form", FORMS, ids=["bell", "cone", "frustum"])
-def test_that_derivatives_are_those_of_the_residuals(rng, form, n_free):
-    n = 80
-    along, around = rng.uniform(-0.1, 0.1, (2, n))
-    deviation, noise = 0.01 * rng.normal(size=n), rng.uniform(1e-3, 3e-3, n)
-    p = np.array([0.012, 0.01, -0.005, np.log(0.15), np.log(0.12), 0.001, np.log(1.3)])[:n_free]
-    here, ahead, behind = np.empty((3, n))
-    bumps.residuals(form.number, p, along, around, deviation, noise, here)
+def test_that_sums_are_those_of_the_residuals_and_their_derivatives(rng, form, n_free):
+    data, beliefs, p = made(rng, form, n_free)
     q = np.exp(p[6]) if n_free > 6 else 1.0
-    rho = np.hypot(2 * (along - p[1]) / 0.15, 2 * (around - p[2]) / 0.12)
-    assert_allclose(here, (deviation - p[0] * form.section(rho, q) - p[5]) / noise, atol=1e-9)
-    found = np.empty((n, n_free))
-    bumps.derivatives(form.number, p, along, around, noise, found)
+    rho = np.hypot(2 * (data[0] - p[1]) / np.exp(p[3]), 2 * (data[1] - p[2]) / np.exp(p[4]))
     # A section has a kink at its rim, a frustum also at its top.
     smooth = (np.abs(rho - 1) > 1e-3) & (np.abs(rho - q / (1 + q)) > 1e-3)
-    h = 1e-6
-    for k in range(n_free):
-        step = h * np.eye(n_free)[k]
-        bumps.residuals(form.number, p + step, along, around, deviation, noise, ahead)
-        bumps.residuals(form.number, p - step, along, around, deviation, noise, behind)
-        numeric = (ahead - behind) / (2 * h)
-        assert_allclose(found[smooth, k], numeric[smooth], rtol=1e-4, atol=1e-4)
+    data = tuple(values[smooth] for values in data)
+    here = residuals(form, p, data, beliefs)
+    steps = 1e-6 * np.eye(n_free)
+    jacobian = np.stack(
+        [
+            (residuals(form, p + h, data, beliefs) - residuals(form, p - h, data, beliefs)) / 2e-6
+            for h in steps
+        ],
+        axis=1,
+    )
+    normal, right = np.empty((n_free, n_free)), np.empty(n_free)
+    total = bumps.gather(form.number, p, *data, *beliefs, normal, right)
+    assert total == pytest.approx(here @ here)
+    expected = jacobian.T @ jacobian
+    assert_allclose(normal, expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max())
+    size = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(here)
+    assert_allclose(right / size, -(jacobian.T @ here) / size, atol=1e-4)
+
+
+@pytest.mark.parametrize("n_free", [6, 7])
+@pytest.mark.parametrize("form", FORMS, ids=["bell", "cone", "frustum"])
+def test_that_a_fit_is_no_worse_than_scipys(rng, form, n_free):
+    data, beliefs, p = made(rng, form, n_free)
+    first = p + [0.004, 0.004, 0.003, 0.2, -0.2, 0.0, 0.0][:n_free]
+    found, normal = np.empty(n_free), np.empty((n_free, n_free))
+    chi2 = bumps.fit(form.number, first, *data, *beliefs, 60, 1e-6, found, normal)
+    here = residuals(form, found, data, beliefs)
+    assert chi2 == pytest.approx(here @ here)
+    best = least_squares(lambda p: residuals(form, p, data, beliefs), first, x_scale="jac")
+    assert chi2 <= 2 * best.cost * (1 + 1e-3) + 0.1
+    again, right = np.empty((n_free, n_free)), np.empty(n_free)
+    bumps.gather(form.number, found, *data, *beliefs, again, right)
+    assert_allclose(normal, again)
 
 
 def test_that_a_point_at_the_peak_has_no_slope():
     p = np.array([0.01, 0.0, 0.0, 0.0, 0.0, 0.0, 0.2])
-    zero, found = np.zeros(1), np.empty((1, 7))
+    zero, one = np.zeros(1), np.ones(1)
+    normal, right = np.empty((7, 7)), np.empty(7)
     for form in FORMS:
-        bumps.derivatives(form.number, p, zero, zero, np.ones(1), found)
-        assert_allclose(found, [[-1.0, 0, 0, 0, 0, -1.0, 0]], atol=1e-12)
+        total = bumps.gather(
+            form.number, p, zero, zero, zero, one, np.zeros((1, 7)), zero, normal, right
+        )
+        slopes = np.array([1.0, 0, 0, 0, 0, 1.0, 0])
+        assert total == pytest.approx(1e-4)
+        assert_allclose(normal, np.outer(slopes, slopes), atol=1e-12)
+        assert_allclose(right, -0.01 * slopes, atol=1e-12)

@@ -30,17 +30,28 @@ def test_that_terms_are_waves_and_their_derivatives(rng):
     assert_allclose(terms_of(theta, 3, 2), bends, atol=1e-8)
 
 
+@pytest.mark.parametrize("order", [0, 1, 4])
+def test_that_normal_equations_come_from_sums_of_twice_as_many_terms(rng, order):
+    waves, weight = terms_of(rng.uniform(0, 7, 30), 2 * order), rng.uniform(0.5, 2.0, 30)
+    basis = waves[:, : 2 * order + 1]
+    normal = np.zeros((2 * order + 1, 2 * order + 1))
+    series.write_normal(weight @ waves, order, normal)
+    expected = basis.T @ (weight[:, None] * basis)
+    assert_allclose(np.tril(normal), np.tril(expected), atol=1e-12)
+
+
 def test_that_strays_are_those_far_from_a_weighted_fit(rng):
-    basis, weight = terms_of(rng.uniform(0, 2 * np.pi, 60), 2), rng.uniform(0.5, 2.0, 60)
+    waves, weight = terms_of(rng.uniform(0, 2 * np.pi, 60), 4), rng.uniform(0.5, 2.0, 60)
+    basis = waves[:, :5]
     r = basis @ rng.normal(size=5) + 0.01 * rng.normal(size=60)
-    plain, scale = series.find_strays(basis, r, weight, 1, 4.7)
+    plain, scale = series.find_strays(waves, r, weight, 1, 4.7)
     root = np.sqrt(weight)
     solution = np.linalg.lstsq(root[:, None] * basis, root * r, rcond=None)[0]
     expected = np.abs(r - basis @ solution) * root
     assert_allclose(plain, expected, atol=1e-6)
     assert scale == pytest.approx(1.4826 * np.median(plain) / np.sqrt(55 / 60))
     r[:6] += 0.5
-    residual, scale = series.find_strays(basis, r, weight, 5, 4.7)
+    residual, scale = series.find_strays(waves, r, weight, 5, 4.7)
     assert set(np.flatnonzero(residual > 4 * scale)) >= set(range(6))
     assert scale < 0.02
 
@@ -56,7 +67,7 @@ def test_that_a_positive_definite_system_is_solved(rng):
 def test_that_the_triangle_solves_least_squares(rng):
     a, b = rng.normal(size=(30, 5)), rng.normal(size=30)
     upper = np.empty((5, 6))
-    series.orthogonalise(np.column_stack([a, b]), upper)
+    series.orthogonalise(np.column_stack([a, b]).T.copy(), upper)
     assert_allclose(np.tril(upper[:, :5], -1), 0.0)
     assert_allclose(upper[:, :5].T @ upper[:, :5], a.T @ a, atol=1e-10)
     expected = np.linalg.lstsq(a, b, rcond=None)[0]
@@ -117,7 +128,7 @@ def test_that_the_order_is_chosen_by_what_least_squares_leave(rng):
     a, b = terms_of(rng.uniform(0, 2 * np.pi, n), order), rng.normal(size=n)
     b += 3.0 * a[:, 3] - 2.0 * a[:, 4]
     aic, upper = np.empty(order + 1), np.empty((2 * order + 1, 2 * order + 2))
-    best, left = series.choose_order(np.column_stack([a, b]), float(n), 0.5, aic, upper)
+    best, left = series.choose_order(np.column_stack([a, b]).T.copy(), float(n), 0.5, aic, upper)
     expected = []
     for k in range(order + 1):
         part = a[:, : 2 * k + 1]
