@@ -1,5 +1,6 @@
 """LAZ and COPC by writers whose code is not the reader's; see tests/data/scans/README.md."""
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,19 @@ def test_that_nodes_on_several_pages_and_uneven_chunks_are_told_from_each_other(
     n_chunks = {name: len(las.chunk_starts(SCANS / name)) - 1 for name in ALL}
     assert n_chunks["copclib.copc.laz"] > 20
     assert las.chunk_starts(SCANS / "uneven.laz") == [0, 2_000, 2_001, 2_778, 6_278, 7_000]
+
+
+@pytest.mark.parametrize("name", ["uneven.laz", "laszip.laz"])
+def test_that_chunks_are_found_in_a_file_that_was_written_without_going_back(name, tmp_path):
+    # Then the place of the table of chunks stands at the end, and -1 where it should be.
+    data = bytearray((SCANS / name).read_bytes())
+    (start,) = struct.unpack_from("<I", data, 96)
+    place = data[start : start + 8]
+    data[start : start + 8] = struct.pack("<q", -1)
+    path = tmp_path / "streamed.laz"
+    path.write_bytes(data + place)
+    assert las.chunk_starts(path) == las.chunk_starts(SCANS / name)
+    assert_array_equal(io.read(path).xyz, io.read(SCANS / name).xyz)
 
 
 @pytest.mark.parametrize("name", ALL)
