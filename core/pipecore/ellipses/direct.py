@@ -10,9 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import conics as kernels
+
 Array = NDArray[np.float64]
 
 _CONSTRAINT_INVERSE = np.array([[0.0, 0.0, 0.5], [0.0, -1.0, 0.0], [0.5, 0.0, 0.0]])
+
+
+_QUADRATIC = np.array([[10, 11, 12], [11, 12, 13], [12, 13, 14]])
+_MIXED = np.array([[6, 7, 3], [7, 8, 4], [8, 9, 5]])
+_LINEAR = np.array([[3, 4, 1], [4, 5, 2], [1, 2, 0]])
+"""Where the products of x², xy, y² with themselves and with x, y, 1, and of these, are
+among the sums of powers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +66,10 @@ def fit_direct_ellipses(points: Array, starts: NDArray[np.int64]) -> PlaneEllips
     paper, section 3.3.3, method 1.
     """
     counts = np.diff(starts)
-    group = np.repeat(np.arange(len(counts)), counts)
-
-    def sums(values: Array) -> Array:
-        return np.add.reduceat(values, starts[:-1], axis=0)
-
-    mean = sums(points) / counts[:, None]
-    centred = points - mean[group]
-    scale = np.sqrt(sums((centred**2).sum(axis=1)) / counts)
-    scale[scale == 0.0] = 1.0
-    x, y = (centred / scale[group, None]).T
-
-    quadratic = np.stack([x * x, x * y, y * y], axis=1)
-    linear = np.stack([x, y, np.ones_like(x)], axis=1)
-    s1 = sums(quadratic[:, :, None] * quadratic[:, None, :])
-    s2 = sums(quadratic[:, :, None] * linear[:, None, :])
-    s3 = sums(linear[:, :, None] * linear[:, None, :])
+    m = len(counts)
+    mean, scale, moments = np.empty((m, 2)), np.empty(m), np.empty((m, 15))
+    kernels.scaled_moments(points, starts, mean, scale, moments)
+    s1, s2, s3 = (moments[:, powers] for powers in (_QUADRATIC, _MIXED, _LINEAR))
     usable = (counts >= 6) & (np.linalg.cond(s3) < 1e12)
     s3[~usable] = np.eye(3)
     t = -np.linalg.solve(s3, s2.transpose(0, 2, 1))
@@ -81,13 +78,14 @@ def fit_direct_ellipses(points: Array, starts: NDArray[np.int64]) -> PlaneEllips
     vectors = np.real(vectors)
     discriminant = 4 * vectors[:, 0] * vectors[:, 2] - vectors[:, 1] ** 2
     best = np.argmax(discriminant, axis=1)
-    rows = np.arange(len(counts))
+    rows = np.arange(m)
     usable &= discriminant[rows, best] > 0
     abc = vectors[rows, :, best]
     de_f = np.einsum("mij,mj->mi", t, abc)
     conic = np.where(usable[:, None], np.concatenate([abc, de_f], axis=1), np.nan)
 
-    rss = sums(_sampson_squared(conic[group], x, y))
+    rss = np.empty(m)
+    kernels.sampson_sums(points, starts, mean, scale, conic, rss)
     centre, semi_major, semi_minor, angle = _axes_of_conic(conic)
     return PlaneEllipses(
         mean + centre * scale[:, None],
@@ -96,14 +94,6 @@ def fit_direct_ellipses(points: Array, starts: NDArray[np.int64]) -> PlaneEllips
         angle,
         rss * scale**2,
     )
-
-
-def _sampson_squared(conic: Array, x: Array, y: Array) -> Array:
-    """Squared distance from the conic to first order: F² / |∇F|²."""
-    a, b, c, d, e, f = conic.T
-    value = a * x * x + b * x * y + c * y * y + d * x + e * y + f
-    gradient = (2 * a * x + b * y + d) ** 2 + (b * x + 2 * c * y + e) ** 2
-    return np.asarray(value**2 / np.maximum(gradient, 1e-300))
 
 
 def _axes_of_conic(conic: Array) -> tuple[Array, Array, Array, Array]:
