@@ -135,15 +135,16 @@ def _measure(
     index, xyz, normals = nearby.of_cloud(thinned)
     finding = find_deformations(element, xyz, normals, neighbours, settings)
     check()
-    own = xyz[finding.belongs]
+    own = finding.points[finding.belongs]
+    places = own.chainage, own.distance, own.clock
     spacing = nearby.usual_spacing(thinned)
     section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
-    rows = cut_normal_stack(element, own, section_width, spacing, fit, check)
-    variation = curvature_variations(element, own, rows, section_width, check)
+    rows = cut_normal_stack(element, places, section_width, spacing, fit, check)
+    variation = curvature_variations(element, places, rows, section_width, check)
     rows = replace(rows, curvature_variation=variation)
     complete = replace(
         element,
-        n_points=len(own),
+        n_points=len(own.chainage),
         n_profiles=len(rows),
         arc=float(np.median(rows.arc)) if len(rows) else element.arc,
         ovality=finding.ovality,

@@ -20,7 +20,7 @@ from pipecore.deformation.reference import (
 )
 from pipecore.deformation.strain import dent_strain
 from pipecore.deformation.surface import Surface, own_surface
-from pipecore.deformation.unrolled import surface_distance, unroll
+from pipecore.deformation.unrolled import Unrolled, surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.settings import DeformationSettings
 from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind
@@ -59,6 +59,8 @@ class DeformationFinding:
         Signed distance of every point from the undeformed contour, metres, outward
         positive; nan for points that are not of the surface.
     belongs : ndarray of bool, shape (n,)
+    points : Unrolled
+        All n points in the coordinates of the element.
     map : DeviationMap, optional
         None where there are too few points.
     ovality, ovality_sd : float
@@ -72,6 +74,7 @@ class DeformationFinding:
     deformations: tuple[Deformation, ...]
     deviation: NDArray[np.float32]
     belongs: Flags
+    points: Unrolled
     map: DeviationMap | None
     ovality: float = np.nan
     ovality_sd: float = np.nan
@@ -105,6 +108,7 @@ def find_deformations(
             (),
             np.full(len(xyz), np.nan, np.float32),
             np.zeros(len(xyz), bool),
+            points,
             None,
             not_measurable=dict.fromkeys(_applicable(element), "too few points"),
         )
@@ -156,6 +160,7 @@ def find_deformations(
         tuple(sorted(deformations, key=lambda d: (d.chainage, d.kind))),
         deviation,
         own,
+        points,
         replace(heights, deviation=heights.deviation - contour.height),
         ovality,
         ovality_sd,

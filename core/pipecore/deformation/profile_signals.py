@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipecore._kernels.grouping import group_from
 from pipecore.deformation import section_curve
 from pipecore.geometry import Array
 from pipecore.types import Element, Profiles
@@ -18,7 +19,7 @@ AT_ONCE = 200
 
 def curvature_variations(
     element: Element,
-    xyz: Array,
+    places: tuple[Array, Array, Array],
     profiles: Profiles,
     width: float,
     check: Callable[[], None] = lambda: None,
@@ -28,8 +29,8 @@ def curvature_variations(
     Parameters
     ----------
     element : Element
-    xyz : ndarray, shape (n, 3)
-        Points of its surface.
+    places : tuple of ndarray
+        Pipe coordinates (n,) of the points of its surface.
     profiles : Profiles
         Of its own stack, m rows.
     width : float
@@ -45,15 +46,14 @@ def curvature_variations(
     variation = np.full(len(profiles), np.nan)
     if len(profiles) == 0:
         return variation
-    chainage, rho, clock = element.axis.pipe_coordinates(xyz)
-    index = np.floor(chainage / width).astype(np.int64)
-    order = np.argsort(index, kind="stable")
+    chainage, rho, clock = places
+    index = np.floor(chainage / width).astype(np.int32)
+    order, starts = group_from(index, 0, max(int(index.max()), 0) + 1)
     index, rho, clock = index[order], rho[order], clock[order]
     # A taper within a profile is no thickness of the section.
     middle = np.asarray((index + 0.5) * width, np.float64)
     rho = rho + (element.radius_at(middle) - element.radius_at(chainage[order]))
-    first = np.searchsorted(index, profiles.profile_index, side="left")
-    last = np.searchsorted(index, profiles.profile_index, side="right")
+    first, last = starts[profiles.profile_index], starts[profiles.profile_index + 1]
     for start in range(0, len(variation), AT_ONCE):
         check()
         rows = slice(start, start + AT_ONCE)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels import axes as axis_kernels
+from pipecore._kernels import unrolled as kernels
 from pipecore.geometry import ArcAxis, Array
 from pipecore.types import Element, ElementKind
 
@@ -17,8 +19,8 @@ class Unrolled:
 
     Parameters
     ----------
-    chainage, clock : ndarray
-        Metres and radians (0 … 2π).
+    chainage, distance, clock : ndarray
+        Metres, metres from the axis, and radians (0 … 2π).
     height : ndarray
         Signed distance from the element's fitted surface, metres, outward positive.
     alignment : ndarray
@@ -26,6 +28,7 @@ class Unrolled:
     """
 
     chainage: Array
+    distance: Array
     clock: Array
     height: Array
     alignment: Array
@@ -33,35 +36,37 @@ class Unrolled:
     def __getitem__(self, rows: Flags | NDArray[np.intp]) -> "Unrolled":
         """Return the given points."""
         return Unrolled(
-            self.chainage[rows], self.clock[rows], self.height[rows], self.alignment[rows]
+            self.chainage[rows],
+            self.distance[rows],
+            self.clock[rows],
+            self.height[rows],
+            self.alignment[rows],
         )
 
 
 def unroll(element: Element, xyz: Array, normals: Array) -> Unrolled:
     """Return points (n, 3) with their normals in the coordinates of an element."""
-    axis = element.axis
-    chainage, distance, clock = axis.pipe_coordinates(xyz)
+    chainage, distance, clock, height, alignment = np.empty((5, len(xyz)))
+    slope = (element.radius_end - element.radius) / element.axis.length
+    kernels.unroll(
+        element.axis.numbers, element.radius, slope, xyz, normals,
+        chainage, distance, clock, height, alignment,
+    )  # fmt: skip
     if element.kind is ElementKind.SPHERE:
-        from_centre = xyz - element.centre
-        distance = np.linalg.norm(from_centre, axis=1)
-        outward = from_centre / np.maximum(distance, 1e-9)[:, None]
-        height = distance - element.radius
-    else:
-        slope = (element.radius_end - element.radius) / axis.length
-        outward = xyz - axis.at(chainage)
-        outward /= np.maximum(distance, 1e-9)[:, None]
-        outward -= slope * axis.tangent(chainage)
-        outward /= np.hypot(1.0, slope)
-        height = (distance - element.radius_at(chainage)) / np.hypot(1.0, slope)
-    alignment = np.abs(np.einsum("ij,ij->i", outward, normals))
-    return Unrolled(chainage, clock, height, alignment)
+        outward = xyz - element.centre
+        from_centre = np.linalg.norm(outward, axis=1)
+        height = from_centre - element.radius
+        alignment = np.abs(np.einsum("ij,ij->i", outward, normals))
+        alignment /= np.maximum(from_centre, 1e-9)
+    return Unrolled(chainage, distance, clock, height, alignment)
 
 
 def surface_distance(element: Element, xyz: Array) -> Array:
     """Unsigned distance of points (n, 3) from an element's surface between its ends."""
-    chainage, distance, _ = element.axis.pipe_coordinates(xyz)
     if element.kind is ElementKind.SPHERE:
         return np.asarray(np.abs(np.linalg.norm(xyz - element.centre, axis=1) - element.radius))
+    chainage, distance, clock = np.empty((3, len(xyz)))
+    axis_kernels.pipe_coordinates(element.axis.numbers, xyz, chainage, distance, clock)
     within = np.clip(chainage, 0.0, element.axis.length)
     return np.asarray(np.hypot(distance - element.radius_at(within), chainage - within))
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pipecore._kernels.grouping import group_from
 from pipecore._kernels.sections import fit_sections
 from pipecore.ellipses import (
     CIRCLE_PARAMETERS,
@@ -30,7 +31,7 @@ ELLIPSE_SD_FACTOR = 2.4
 
 def cut_normal_stack(
     element: Element,
-    xyz: Array,
+    places: tuple[Array, Array, Array],
     width: float,
     spacing: float,
     fit: EllipseFit = EllipseFit.DIRECT,
@@ -41,8 +42,8 @@ def cut_normal_stack(
     Parameters
     ----------
     element : Element
-    xyz : ndarray, shape (n, 3)
-        Points of its surface.
+    places : tuple of ndarray
+        Pipe coordinates (n,) of the points of its surface.
     width : float
         Profile width, metres.
     spacing : float
@@ -63,20 +64,20 @@ def cut_normal_stack(
         element's axis, and the ovality not measurable.
     """
     axis = element.axis
-    chainage, rho, clock = axis.pipe_coordinates(xyz)
-    inside = (chainage >= 0) & (chainage < axis.length)
-    index = (chainage[inside] / width).astype(np.int32)
-    order = np.argsort(index, kind="stable")
-    index = index[order]
+    chainage, rho, clock = places
+    index = np.where((chainage >= 0) & (chainage < axis.length), chainage / width, -1.0)
+    n_rows = int(axis.length / width) + 1
+    order, starts = group_from(index.astype(np.int32), 0, n_rows)
+    counts = np.diff(starts)
+    rows = np.flatnonzero(counts)
+    starts = np.append(starts[rows], starts[-1])
+    index = np.repeat(rows, counts[rows])
     # Up and right of the axis, scaled so that a cone's or sphere's taper within a profile
     # does not thicken the section.
     middle = np.asarray((index + 0.5) * width, np.float64)
-    taper = element.radius_at(middle) - element.radius_at(chainage[inside][order])
-    rho = rho[inside][order] + taper
-    clock = clock[inside][order]
+    taper = element.radius_at(middle) - element.radius_at(chainage[order])
+    rho, clock = rho[order] + taper, clock[order]
     up_right = np.stack([rho * np.cos(clock), rho * np.sin(clock)], axis=1)
-    rows, first = np.unique(index, return_index=True)
-    starts = np.append(first, len(index)).astype(np.int64)
     if len(rows) == 0:
         return Profiles.empty()
     fits = np.empty((len(rows), 5))

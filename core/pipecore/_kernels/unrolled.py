@@ -1,0 +1,49 @@
+"""Points in the coordinates of an element, with how they face its surface."""
+
+import math
+
+from numba import njit
+
+from pipecore._kernels.axes import across_axis, polar
+
+
+@njit(cache=True, nogil=True)
+def facing(axis, slope, x, y, z, nx, ny, nz):
+    """Chainage, distance and clock of a point, and how its normal agrees with the surface's.
+
+    The surface is one of revolution whose radius grows by `slope` per chainage; what is
+    returned is the cosine of the angle between the normals, times the distance from the axis.
+    """
+    chainage, up, right = across_axis(axis, x, y, z)
+    rho, clock = polar(up, right)
+    bend = axis[12]
+    if bend == 0.0:
+        across = nx * (axis[6] * up + axis[9] * right)
+        across += ny * (axis[7] * up + axis[10] * right)
+        across += nz * (axis[8] * up + axis[11] * right)
+        ahead = nx * axis[3] + ny * axis[4] + nz * axis[5]
+    else:
+        # Out of the arc's centre, along its normal, and ahead.
+        cos, sin = math.cos(chainage / bend), math.sin(chainage / bend)
+        outward = axis[14] * up + axis[15] * right
+        side = axis[15] * up - axis[14] * right
+        start = nx * axis[6] + ny * axis[7] + nz * axis[8]
+        later = nx * axis[9] + ny * axis[10] + nz * axis[11]
+        across = outward * (cos * start + sin * later)
+        across += side * (nx * axis[3] + ny * axis[4] + nz * axis[5])
+        ahead = cos * later - sin * start
+    return chainage, rho, clock, (across - slope * rho * ahead) / math.sqrt(1.0 + slope * slope)
+
+
+@njit(cache=True, nogil=True)
+def unroll(axis, radius, slope, xyz, normals, chainage, rho, clock, height, alignment):
+    """Write pipe coordinates of points, their height above a surface, and |cosines| to it."""
+    steep = math.sqrt(1.0 + slope * slope)
+    for i in range(xyz.shape[0]):
+        s, distance, theta, along = facing(
+            axis, slope, xyz[i, 0], xyz[i, 1], xyz[i, 2],
+            normals[i, 0], normals[i, 1], normals[i, 2],
+        )  # fmt: skip
+        chainage[i], rho[i], clock[i] = s, distance, theta
+        height[i] = (distance - radius - slope * s) / steep
+        alignment[i] = abs(along) / max(distance, 1e-9)
