@@ -85,9 +85,7 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
     del uneven
     with _timed(seconds, "segments"):
         segments = overlay.number_segments(progress)
-        behind = points.behind(surface)
-        segment_id = spread(segments, behind, points.allocate, progress)
-        surface = replace(surface, parent=segment_id[:0])  # told by what is behind
+        segment_id = spread(segments, surface.behind, points.allocate, progress)
     with _timed(seconds, "ellipses"):
         progress.update("ellipses", 0.0)
         ellipses = Ellipses.concatenate(found)
@@ -96,7 +94,7 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
         chains = join_centres(ellipses, progress)
     with _timed(seconds, "elements"):
         pieces = find_pieces(ellipses, chains, progress)
-        nearby = NearbyPoints(cloud, surface, behind, progress, points.allocate)
+        nearby = NearbyPoints(cloud, surface, progress, points.allocate)
         built = build_elements(pieces, nearby, settings.elements, progress)
         profiles = tabulate_ellipses(built.elements, ellipses)
     with _timed(seconds, "deformations"):

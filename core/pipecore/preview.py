@@ -18,6 +18,7 @@ from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
 from pipecore.surface import (
     NOISE_QUANTILE,
+    NOTHING_BEHIND,
     WIDEST_NEIGHBOURHOOD,
     Surface,
     fit_planes,
@@ -178,7 +179,7 @@ def _surface_of_sample(
     is_whole = np.full(len(normals), is_all) | _is_well_inside(thinned.xyz)
     known = residuals[np.isfinite(residuals) & is_whole]
     noise = float(np.quantile(known, NOISE_QUANTILE)) if len(known) else np.nan
-    return Surface(thinned.xyz, normals, distances, thinned.parent, voxel, noise), is_whole
+    return Surface(thinned.xyz, normals, distances, thinned.behind, voxel, noise), is_whole
 
 
 def _is_well_inside(xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -243,7 +244,7 @@ def preview_profile(
 
 def _nothing(plan: Plan) -> Surface:
     nowhere, none = np.empty((0, 3)), np.empty(0)
-    return Surface(nowhere, nowhere, none, np.empty(0, np.int32), plan.voxel, plan.noise)
+    return Surface(nowhere, nowhere, none, NOTHING_BEHIND, plan.voxel, plan.noise)
 
 
 def _slab(

@@ -11,22 +11,21 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels.grouping import group_by_label
+from pipecore._kernels.grouping import spread_to_members
 from pipecore.allocation import BLOCK, Allocate, in_memory
 from pipecore.ellipses import Ellipses, fit_ellipses
+from pipecore.parallel import for_chunks
 from pipecore.profiles import Curves, segment_profiles
-from pipecore.progress import Progress, Renamed, in_chunks
+from pipecore.progress import Progress, Renamed
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.stacks.directions import local_axes
 from pipecore.stacks.places import stacks_of_cells
-from pipecore.surface import Surface, sample_surface
+from pipecore.surface import Order, Surface, sample_surface
 from pipecore.surface.cells import Cells, cells_of_points
 from pipecore.surface.planes import find_planes
 from pipecore.types import PointCloud, Stack
 
 Array = NDArray[np.float64]
-Behind = tuple[NDArray[np.int64], NDArray[np.int64]]
-"""The cloud's points in the order of their thinned points, and where those of each begin."""
 Cut = tuple[NDArray[np.int32], NDArray[np.int64], Ellipses]
 """The thinned points of some curves, where those of each begin, and the curves' ellipses."""
 
@@ -71,10 +70,6 @@ class Workspace(Protocol):
         """Thin the cloud and estimate the normals of the thinned points."""
         ...
 
-    def behind(self, surface: Surface) -> Behind:
-        """Tell which points of the cloud each thinned point stands for."""
-        ...
-
     def local_axes(self, surface: Surface, progress: Progress) -> Array:
         """Directions of the local axis at sampled curved places of the surface."""
         ...
@@ -112,11 +107,6 @@ class InMemory:
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
         """See `Workspace`."""
         return sample_surface(self.cloud, settings, progress)
-
-    def behind(self, surface: Surface) -> Behind:
-        """See `Workspace`."""
-        members, starts = group_by_label(surface.parent, len(surface.xyz))
-        return members, starts
 
     def local_axes(self, surface: Surface, progress: Progress) -> Array:
         """See `Workspace`."""
@@ -184,12 +174,14 @@ def cut_and_fit(
 
 
 def spread(
-    values: NDArray[np.int32], behind: Behind, allocate: Allocate, progress: Progress
+    values: NDArray[np.int32], behind: Order, allocate: Allocate, progress: Progress
 ) -> NDArray[np.int32]:
     """Give each point of the cloud the value of its thinned point."""
     members, starts = behind
     spread_out: NDArray[np.int32] = allocate("segment_id", (len(members),), np.int32)
-    for first, last in in_chunks(len(values), BLOCK, "segments", progress):
-        own = members[starts[first] : starts[last]]
-        spread_out[own] = np.repeat(values[first:last], np.diff(starts[first : last + 1]))
+
+    def give(first: int, last: int) -> None:
+        spread_to_members(values, members, starts, first, last, spread_out)
+
+    for_chunks(give, len(values), BLOCK, "segments", progress)
     return spread_out

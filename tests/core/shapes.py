@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from pipecore.geometry import Axis, surface_points, unit
 from pipecore.progress import NoProgress
 from pipecore.settings import ThinningSettings
-from pipecore.surface import Surface, sample_surface
+from pipecore.surface import Order, Surface, sample_surface
 from pipecore.types import PointCloud
 
 Array = NDArray[np.float64]
@@ -112,7 +112,17 @@ def known(*parts: tuple[Array, Array], spacing: float = 0.01, noise: float = 0.0
     """Some surfaces with their true normals, not thinned."""
     xyz, normals = (np.concatenate(p) for p in zip(*parts, strict=True))
     n = len(xyz)
-    return Surface(xyz, normals, np.full(n, spacing), np.arange(n, dtype=np.int32), spacing, noise)
+    behind = np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)
+    return Surface(xyz, normals, np.full(n, spacing), behind, spacing, noise)
+
+
+def parents(behind: Order) -> NDArray[np.intp]:
+    """The thinned point of each point of a cloud."""
+    members, starts = behind
+    parent = np.full(len(members), -1)
+    parent[members] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+    assert (parent >= 0).all()
+    return parent
 
 
 def part_of(*parts: tuple[Array, Array]) -> NDArray[np.intp]:

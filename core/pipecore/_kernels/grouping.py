@@ -27,6 +27,14 @@ def group_by_label(labels, n_labels):
 
 
 @njit(cache=True, nogil=True)
+def spread_to_members(values, members, starts, first, last, spread_out):
+    """Write the value of each group first … last to all of its members."""
+    for k in range(first, last):
+        for m in range(starts[k], starts[k + 1]):
+            spread_out[members[m]] = values[k]
+
+
+@njit(cache=True, nogil=True)
 def group_from(labels, first, n_labels):
     """Do as `group_by_label` for labels from `first` on, leaving out items of smaller ones."""
     starts = np.zeros(n_labels + 1, np.int64)

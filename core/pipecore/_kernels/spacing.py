@@ -23,6 +23,21 @@ def hash_places(xyz, start, stop, hashes):
 
 
 @njit(cache=True, nogil=True)
+def draw_places(xyz, start, stop, bound, drawn):
+    """List the points start … stop whose hash is at most `bound`; return how many."""
+    n = 0
+    block = np.empty(1024, np.uint64)
+    for begin in range(start, stop, 1024):
+        end = min(begin + 1024, stop)
+        hash_places(xyz, begin, end, block)
+        for i in range(begin, end):
+            if block[i - begin] <= bound:
+                drawn[n] = i
+                n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
 def collect_marked(xyz, start, stop, first, edge, n_y, n_z, table_keys, table_ids, found, cells):
     """List the points start … stop that lie in marked cubes, with their cubes' numbers."""
     mask = np.int64(table_keys.shape[0] - 1)

@@ -1,7 +1,7 @@
-"""Means of the points in each cube of a grid, and look-up of the cubes' neighbours.
+"""Numbers of the cubes of a grid, and their look-up by a hash table.
 
-Cubes begin at whole multiples of their edge from the local zero, and sums are kept in
-whole micrometres, so that a part of the cloud is thinned as the whole is, in any order.
+Cubes begin at whole multiples of their edge from the local zero, so that a part of the cloud
+is divided as the whole is.
 """
 
 import math
@@ -38,22 +38,16 @@ def slot_of(key, table_keys, mask):
 
 
 @njit(cache=True, nogil=True)
-def number_voxels(
-    xyz, start, stop, first, edge, n_y, n_z, part, n_parts, table_keys, table_ids, n, keys, ids
-):
+def number_voxels(xyz, start, stop, first, edge, n_y, n_z, table_keys, table_ids, n, keys, ids):
     """Give each new cube of points start … stop the next number; write each point's number.
 
-    Only cubes whose hash falls to `part` of `n_parts` are looked at, so that parts may run
-    beside each other; what is written is `n_parts` times the number plus `part`. `keys`
-    takes the key of each number. Stops early where the table is half full; returns the
-    point to go on with and how many cubes are numbered, `n` before.
+    `keys` takes the key of each number. Stops early where the table is half full; returns
+    the point to go on with and how many cubes are numbered, `n` before.
     """
     mask = np.int64(table_keys.shape[0] - 1)
     room = min(table_keys.shape[0] // 2, keys.shape[0])
     for i in range(start, stop):
         key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
-        if n_parts > 1 and np.int64(hash_of(key) >> np.uint64(52)) % n_parts != part:
-            continue
         slot = slot_of(key, table_keys, mask)
         if table_keys[slot] == EMPTY:
             if n >= room:
@@ -62,7 +56,7 @@ def number_voxels(
             table_ids[slot] = n
             keys[n] = key
             n += 1
-        ids[i] = table_ids[slot] * n_parts + part
+        ids[i] = table_ids[slot]
     return stop, n
 
 
@@ -71,26 +65,6 @@ def rename_voxels(ids, start, stop, new_ids):
     """Give points start … stop the new numbers of their cubes."""
     for i in range(start, stop):
         ids[i] = new_ids[ids[i]]
-
-
-@njit(cache=True, nogil=True)
-def sum_voxels(xyz, ids, first, last, sums, counts):
-    """Add up the points of the cubes first … last, in whole micrometres."""
-    for i in range(xyz.shape[0]):
-        k = ids[i]
-        if k < first or k >= last:
-            continue
-        for j in range(3):
-            sums[k, j] += np.int64(round(xyz[i, j] * 1e6))
-        counts[k] += 1
-
-
-@njit(cache=True, nogil=True)
-def mean_voxels(sums, counts, start, stop, means):
-    """Write the means of cubes start … stop."""
-    for k in range(start, stop):
-        for j in range(3):
-            means[k, j] = sums[k, j] / (1e6 * counts[k])
 
 
 @njit(cache=True, nogil=True)

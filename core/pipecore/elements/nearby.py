@@ -78,9 +78,6 @@ class NearbyPoints:
     ----------
     cloud : PointCloud
     surface : Surface
-    behind : (ndarray, ndarray), optional
-        The cloud's points in the order of their thinned points, and where those of each
-        begin, if known; by default found from `surface.parent`.
     progress : Progress
         Told now and then while the points are put into cells.
     allocate : callable
@@ -91,15 +88,12 @@ class NearbyPoints:
         self,
         cloud: PointCloud,
         surface: Surface,
-        behind: tuple[NDArray[np.int64], NDArray[np.int64]] | None = None,
         progress: Progress = NoProgress(),
         allocate: Allocate = in_memory,
     ) -> None:
         self._cloud = cloud
         self.surface = surface
-        self._members: NDArray[np.int64]
-        self._starts: NDArray[np.int64]
-        self._members, self._starts = behind or group_by_label(surface.parent, len(surface.xyz))
+        self._members, self._starts = surface.behind
         edge = CELL_VOXELS * surface.voxel
         frame = GridFrame.of(surface.xyz, edge)
         first, _, n_y, n_z = frame.numbers

@@ -7,7 +7,8 @@ from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
-from pipecore.surface.grid import CellGrid, GridFrame
+from pipecore.surface.grid import GridFrame
+from pipecore.surface.sorting import CellGrid
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def axes_at(
     What is further than `REACH` voxels from all sampled points does not change the result.
     """
     radius = REACH * voxel
-    grid = CellGrid.build(points, radius)
+    grid = CellGrid.build(points, radius, "directions", progress)
     # Few of the points are looked at: they are not copied cell by cell.
     cells = np.searchsorted(grid.cell_keys, GridFrame.of(points, radius).keys(points[sample]))
     lookup = grid.lookup

@@ -9,19 +9,23 @@ from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
-from pipecore.surface.grid import CellGrid, cells_of
+from pipecore.surface.grid import cells_of
+from pipecore.surface.sorting import CellGrid, Order, index_type, take_points
 from pipecore.surface.spacing import median_spacing
 from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
 from pipecore.types import PointCloud
 
 __all__ = [
+    "NOTHING_BEHIND",
     "SMALLEST_VOXEL",
+    "Order",
     "Surface",
     "ThinnedCloud",
     "average_voxels",
     "cells_of",
     "estimate_normals",
     "fit_planes",
+    "index_type",
     "median_spacing",
     "sample_surface",
     "thin",
@@ -36,6 +40,9 @@ NOISE_QUANTILE = 0.25
 
 MIN_NEIGHBOURS = 7
 
+NOTHING_BEHIND: Order = np.empty(0, np.int32), np.zeros(1, np.int32)
+"""Of a surface whose points stand for none of a cloud's."""
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -47,8 +54,9 @@ class Surface:
         Local coordinates; unit normals of either sign, nan where there are too few neighbours.
     spacing : ndarray, shape (m,)
         Distance between neighbouring points around each point, metres.
-    parent : ndarray of int32, shape (n,)
-        Index of the surface point of each point of the cloud.
+    behind : (ndarray of int, shape (n,), ndarray of int, shape (m + 1,))
+        The cloud's points in the order of their surface points, and where those of each
+        begin.
     voxel : float
         Edge of the thinning's voxels, metres.
     noise : float
@@ -58,7 +66,7 @@ class Surface:
     xyz: NDArray[np.float64]
     normals: NDArray[np.float64]
     spacing: NDArray[np.float64]
-    parent: NDArray[np.int32]
+    behind: Order
     voxel: float
     noise: float
 
@@ -73,7 +81,7 @@ class Surface:
             self.xyz[rows],
             self.normals[rows],
             self.spacing[rows],
-            np.empty(0, np.int32),
+            NOTHING_BEHIND,
             self.voxel,
             self.noise,
         )
@@ -96,8 +104,8 @@ def fit_planes(
     """
     n = len(points)
     radius = NEIGHBOURHOOD * voxel
-    grid = CellGrid.build(points, radius)
-    xyz = points[grid.order]
+    grid = CellGrid.build(points, radius, "normals", progress)
+    xyz = take_points(points, grid.order)
     normals, residuals, spacing = np.empty((n, 3)), np.empty(n), np.empty(n)
 
     def work(start: int, stop: int) -> None:
@@ -115,7 +123,7 @@ def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
     normals, residuals, spacing = fit_planes(thinned.xyz, thinned.voxel, progress)
     known = np.isfinite(residuals).any()
     noise = float(np.nanquantile(residuals, NOISE_QUANTILE)) if known else np.nan
-    return Surface(thinned.xyz, normals, spacing, thinned.parent, thinned.voxel, noise)
+    return Surface(thinned.xyz, normals, spacing, thinned.behind, thinned.voxel, noise)
 
 
 def sample_surface(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> Surface:

@@ -1,16 +1,19 @@
-"""A hashed grid of cubic cells over points, for neighbours within a cell's edge."""
+"""Grids of cubic cells: where they lie, how they are numbered and looked up."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import voxels
-from pipecore._kernels.grouping import group_by_label
+from pipecore._kernels import sorting, voxels
 from pipecore.errors import PipecoreError
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress
 
 Array = NDArray[np.float64]
 Table = tuple[NDArray[np.int64], NDArray[np.int32]]
+
+CHUNK = 1_000_000
 
 
 def cells_of(values: NDArray[np.floating], edge: float) -> Array:
@@ -32,6 +35,7 @@ class GridFrame:
     first: NDArray[np.int64]
     """The lowest cell."""
     edge: float
+    n_x: int
     n_y: int
     n_z: int
 
@@ -53,7 +57,7 @@ class GridFrame:
                 extent=extent.max() * edge,
                 edge=edge * 1000.0,
             )
-        return cls(lowest.astype(np.int64), edge, int(extent[1]), int(extent[2]))
+        return cls(lowest.astype(np.int64), edge, *(int(n) for n in extent))
 
     @classmethod
     def of(cls, xyz: NDArray[np.floating], edge: float) -> "GridFrame":
@@ -83,11 +87,17 @@ class GridFrame:
 
 
 def bounds(xyz: NDArray[np.floating]) -> tuple[Array, Array]:
-    """Lowest and highest coordinates of points (n, 3)."""
-    # Column by column is several times as fast as along the first axis at once.
-    columns = range(xyz.shape[1])
-    low = np.array([xyz[:, i].min() for i in columns], np.float64)
-    return low, np.array([xyz[:, i].max() for i in columns], np.float64)
+    """Lowest and highest coordinates of points (n, 3), of which there is at least one."""
+    corners = np.empty((-(-len(xyz) // CHUNK), 2, 3))
+
+    def find(start: int, stop: int) -> None:
+        sorting.find_bounds(xyz, start, stop, corners[start // CHUNK])
+
+    if len(corners) == 1:
+        find(0, len(xyz))
+    else:
+        for_chunks(find, len(xyz), CHUNK, "", NoProgress())
+    return corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
 
 
 def empty_table(n_keys: int) -> Table:
@@ -104,16 +114,10 @@ def table_of(keys: NDArray[np.int64]) -> Table:
 
 
 class VoxelCounter:
-    """Numbers the cells that points lie in, in the order in which they are met.
+    """Numbers the cells that points lie in, in the order in which they are met."""
 
-    Some counters may share the points between them, each taking the cells of one part.
-    """
-
-    def __init__(
-        self, frame: GridFrame, part: int = 0, n_parts: int = 1, room: int = 2**12
-    ) -> None:
-        self.part = part
-        self._frame, self._n_parts = frame, n_parts
+    def __init__(self, frame: GridFrame, room: int = 2**12) -> None:
+        self._frame = frame
         self._table = empty_table(room)
         self._keys = np.empty(room, np.int64)
         self.n_cells = 0
@@ -124,10 +128,10 @@ class VoxelCounter:
         return self._keys[: self.n_cells]
 
     def add(self, xyz: NDArray[np.floating], start: int, stop: int, ids: NDArray[np.int32]) -> None:
-        """Write the cells of points start … stop: `n_parts` times the number plus `part`."""
+        """Write the cells of points start … stop."""
         while True:
             start, self.n_cells = voxels.number_voxels(
-                xyz, start, stop, *self._frame.numbers, self.part, self._n_parts,
+                xyz, start, stop, *self._frame.numbers,
                 *self._table, self.n_cells, self._keys, ids,
             )  # fmt: skip
             if start == stop:
@@ -139,51 +143,3 @@ class VoxelCounter:
         self._table = empty_table(2 * len(self._keys))
         voxels.fill_table(known, *self._table)
         self._keys = np.resize(known, 2 * len(self._keys))
-
-
-@dataclass(frozen=True, eq=False)
-class CellGrid:
-    """Points sorted by cell."""
-
-    edge: float
-    order: NDArray[np.int64]
-    """Positions of the sorted points in the array given."""
-    cell_keys: NDArray[np.int64]
-    """Number of each cell, ascending, shape (c,)."""
-    cell_starts: NDArray[np.int64]
-    n_y: int
-    n_z: int
-
-    @classmethod
-    def build(cls, xyz: NDArray[np.floating], edge: float) -> "CellGrid":
-        """Sort points (n, 3) into cells of `edge` metres."""
-        frame = GridFrame.of(xyz, edge)
-        counter = VoxelCounter(frame)
-        cell = np.empty(len(xyz), np.int32)
-        counter.add(xyz, 0, len(xyz), cell)
-        by_key = np.argsort(counter.keys)
-        keys = counter.keys[by_key]
-        rank = np.empty(len(keys), np.int32)
-        rank[by_key] = np.arange(len(keys), dtype=np.int32)
-        del counter
-        voxels.rename_voxels(cell, 0, len(cell), rank)
-        order, starts = group_by_label(cell, len(keys))
-        return cls(edge, order, keys, starts, frame.n_y, frame.n_z)
-
-    @property
-    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.int64], int, int]:
-        """What kernels need that go through all cells in their order."""
-        return self.cell_keys, self.cell_starts, self.n_y, self.n_z
-
-    @property
-    def lookup(
-        self,
-    ) -> tuple[
-        NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int32], int, int
-    ]:
-        """What the kernels in `pipecore._kernels.neighbours` need to find neighbours.
-
-        Makes a hash table from the cells' numbers to their places: to be asked for once.
-        """
-        table = table_of(self.cell_keys)
-        return self.cell_keys, self.cell_starts, *table, self.n_y, self.n_z

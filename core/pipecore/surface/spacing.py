@@ -51,16 +51,15 @@ def sample_by_place(
     share = min(1.0, (n_sample + 10 * np.sqrt(n_sample)) / len(xyz))
     while True:
         bound = np.uint64(min(share * 2.0**64, 2.0**64 - 2048))
-        drawn: dict[int, tuple[NDArray[np.intp], NDArray[np.uint64]]] = {}
+        drawn: dict[int, NDArray[np.intp]] = {}
 
         def draw(start: int, stop: int) -> None:
-            hashes = np.empty(stop - start, np.uint64)
-            kernels.hash_places(xyz, start, stop, hashes)
-            rows = np.flatnonzero(hashes <= bound)  # noqa: B023 - used within the round
-            drawn[start] = rows + start, hashes[rows]  # noqa: B023
+            rows = np.empty(stop - start, np.intp)
+            n = kernels.draw_places(xyz, start, stop, bound, rows)  # noqa: B023 - in the round
+            drawn[start] = rows[:n].copy()  # noqa: B023
 
         for_chunks(draw, len(xyz), CHUNK, "thinning", progress, (0.0, 0.05))
-        rows = np.concatenate([drawn[start][0] for start in sorted(drawn)])
+        rows = np.concatenate([drawn[start] for start in sorted(drawn)])
         if share == 1.0:
             rows = np.arange(len(xyz))
         if len(rows) >= n_sample:
@@ -84,8 +83,9 @@ def _reach_of_neighbours(
     least = max(float((high - low).max()) / WIDEST_GRID, 1e-9)
     nearest, _ = cKDTree(sample).query(sample, min(2, len(sample)))
     apart = float(np.median(nearest.reshape(len(sample), -1)[:, -1]))
-    # Were all points as far apart as the sample's, spread over surfaces.
-    edge = max(apart * np.sqrt(k * len(sample) / len(xyz)), least)
+    # Were all points as far apart as the sample's, spread over surfaces; and as much again,
+    # so that one look at all points will mostly do.
+    edge = max(2.0 * apart * np.sqrt(k * len(sample) / len(xyz)), least)
     while True:
         reach = _within_cells(xyz, sample, k, GridFrame.around(low, high, edge), progress)
         if 2 * np.isfinite(reach).sum() > len(sample) + 1 or edge > 2 * np.linalg.norm(high - low):

@@ -20,7 +20,7 @@ from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
 from pipecore.stacks.places import stack_bit
-from pipecore.surface import Surface
+from pipecore.surface import NOTHING_BEHIND, Surface
 from pipecore.surface.cells import Cells, CellSums, sum_cells
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.store import StopWhenUnwanted, Store
@@ -202,7 +202,7 @@ def ellipses_of_batch(
 
     index = of_all("cut")
     xyz, normals, spacing, cut_by = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
-    surface = Surface(xyz, normals, spacing, np.empty(0, np.int32), facts.voxel, facts.noise)
+    surface = Surface(xyz, normals, spacing, NOTHING_BEHIND, facts.voxel, facts.noise)
     curves, ellipses = cut_and_fit(surface, cut_by, stack, settings, StopWhenUnwanted(store))
     store.save(f"points-{number}", index[curves.points])
     store.save(f"curves-{number}", curves.starts)

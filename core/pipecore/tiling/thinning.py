@@ -10,7 +10,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels.grouping import group_by_label
 from pipecore.progress import Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface import (
@@ -21,6 +20,7 @@ from pipecore.surface import (
     average_voxels,
     cells_of,
     fit_planes,
+    index_type,
     median_spacing,
 )
 from pipecore.tiling.engine import Engine
@@ -137,7 +137,7 @@ def thin_in_slabs(
     )
     in_slab = np.array(sorted_parts)  # (parts, slabs)
     ends = np.cumsum(in_slab.sum(axis=0))
-    store.create("members", (n_points,), np.int64)
+    store.create("members", (n_points,), index_type(n_points))
     begins = np.concatenate([np.zeros((len(parts), 1), np.int64), np.cumsum(in_slab, axis=1)], 1)
     thinned = engine.run(
         thin_slab,
@@ -193,13 +193,13 @@ def _gather(store: Store, slabs: tuple[Slab, ...], n_points: int) -> None:
     m = slabs[-1].surface[1]
     xyz, starts = (
         store.create("surface", (m, 3), np.float64),
-        store.create("starts", (m + 1,), np.int64),
+        store.create("starts", (m + 1,), index_type(n_points)),
     )
     starts[m] = n_points
     for k, slab in enumerate(slabs):
         rows = slice(*slab.surface)
         xyz[rows] = store.open(f"thinned-{k}")
-        starts[rows] = store.open(f"starts-{k}") + slab.points[0]
+        starts[rows] = store.open(f"starts-{k}").astype(starts.dtype) + slab.points[0]
         store.remove(f"thinned-{k}", f"starts-{k}")
 
 
@@ -222,7 +222,7 @@ def _with_normals(
             store.open("surface"),
             store.open("normals"),
             store.open("spacing"),
-            np.empty(0, np.int32),
+            (store.open("members"), store.open("starts")),
             edge,
             noise,
         )
@@ -274,7 +274,7 @@ def thin_slab(
     xyz = store.open_coordinates()[rows]
     progress.update("thinning", 0.0)
     thinned = average_voxels(xyz, edge, progress)
-    members, starts = group_by_label(thinned.parent, len(thinned.xyz))
+    members, starts = thinned.behind
     progress.update("thinning", 1.0)
     all_members = store.open("members")
     all_members[first_point : first_point + len(rows)] = rows[members]

@@ -13,7 +13,7 @@ from pipecore.tiling.curves import choose_cuts, cut_in_batches, local_axes_in_sl
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
 from pipecore.types import PointCloud, Stack
-from pipecore.workspace import Behind, Cut, JoinPlanes, Uneven
+from pipecore.workspace import Cut, JoinPlanes, Uneven
 
 
 class InTiles:
@@ -38,15 +38,11 @@ class InTiles:
         self._tiled: TiledSurface | None = None
 
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
-        """See `Workspace`; the surface's parents are known by what is behind it alone."""
+        """See `Workspace`."""
         self._tiled = thin_in_slabs(
             self._engine, len(self.cloud), settings, self._slab_bytes, progress
         )
         return self._tiled.surface
-
-    def behind(self, surface: Surface) -> Behind:
-        """See `Workspace`."""
-        return self._engine.store.open("members"), self._engine.store.open("starts")
 
     def local_axes(self, surface: Surface, progress: Progress) -> NDArray[np.float64]:
         """See `Workspace`."""

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore._kernels import axes, fitting, nearby, surfaces
+from pipecore._kernels.grouping import group_by_label
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.geometry import ArcAxis, LineAxis, unit
@@ -173,7 +174,8 @@ def cloud_around(rng, axis, n=400):
     xyz = thinned[parent] + 0.002 * rng.normal(size=(2 * n, 3))
     normals = unit_rows(rng.normal(size=(n, 3)))
     normals[:5] = np.nan
-    surface_of_cloud = Surface(thinned, normals, np.full(n, 0.01), parent, 0.01, 0.001)
+    behind = group_by_label(parent, n)
+    surface_of_cloud = Surface(thinned, normals, np.full(n, 0.01), behind, 0.01, 0.001)
     return NearbyPoints(PointCloud(np.zeros(3), xyz), surface_of_cloud), xyz, parent
 
 

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 
 from pipecore._kernels import neighbours, spacing, voxels
 from pipecore._kernels.grouping import argsort_keys, group_by_label, group_from, group_large
-from pipecore.surface.grid import CellGrid, GridFrame, VoxelCounter, empty_table, table_of
+from pipecore.surface.grid import GridFrame, VoxelCounter, empty_table, table_of
+from pipecore.surface.sorting import CellGrid
 from tests.core.shapes import unit_rows
 
 # Hashing and random numbers wrap around on purpose, which plain numpy warns of.
@@ -34,7 +35,7 @@ def test_that_points_share_a_number_as_they_share_a_cube(rng):
     n = 0
     for start, stop in ((0, 70), (70, 150)):
         reached, n = voxels.number_voxels(
-            xyz, start, stop, *frame.numbers, 0, 1, table_keys, table_ids, n, keys, ids
+            xyz, start, stop, *frame.numbers, table_keys, table_ids, n, keys, ids
         )
         assert reached == stop
     cells = cells_of(xyz, edge)
@@ -42,41 +43,27 @@ def test_that_points_share_a_number_as_they_share_a_cube(rng):
     assert n == len(cells)
     assert {tuple(np.flatnonzero(ids == k)) for k in range(n)} == set(map(tuple, cells.values()))
 
-    sums, counts = np.zeros((n, 3), np.int64), np.zeros(n, np.int64)
-    for first, last in ((0, 20), (20, n)):
-        voxels.sum_voxels(xyz, ids, first, last, sums, counts)
-    means = np.empty((n, 3))
-    voxels.mean_voxels(sums, counts, 0, n, means)
-    for members in cells.values():
-        k = ids[members[0]]
-        assert counts[k] == len(members)
-        assert_allclose(means[k], xyz[members].mean(axis=0), atol=0.6e-6)
-
 
 def test_that_a_full_table_tells_where_to_go_on(rng):
     xyz, edge = rng.normal(size=(50, 3)), 0.1
     frame = GridFrame.of(xyz, edge)
     ids, keys = np.empty(50, np.int32), np.empty(50, np.int64)
     table = empty_table(8)
-    reached, n = voxels.number_voxels(xyz, 0, 50, *frame.numbers, 0, 1, *table, 0, keys, ids)
+    reached, n = voxels.number_voxels(xyz, 0, 50, *frame.numbers, *table, 0, keys, ids)
     assert n == len(table[0]) // 2
     assert len(cells_of(xyz[:reached], edge)) == n
     assert len(cells_of(xyz[: reached + 1], edge)) == n + 1
 
 
-@pytest.mark.parametrize("n_parts", [1, 3])
-def test_that_counters_that_share_the_points_number_every_cube_once(rng, n_parts):
+def test_that_a_counter_that_grows_numbers_every_cube_once(rng):
     xyz, edge = rng.normal(size=(400, 3)), 0.5
     frame = GridFrame.of(xyz, edge)
-    counters = [VoxelCounter(frame, part, n_parts, room=4) for part in range(n_parts)]
+    counter = VoxelCounter(frame, room=4)
     ids = np.full(400, -1, np.int32)
     for start, stop in ((0, 150), (150, 400)):
-        for counter in counters:
-            counter.add(xyz, start, stop, ids)
-    cells = cells_of(xyz, edge)
-    assert sum(c.n_cells for c in counters) == len(cells)
-    for i, key in enumerate(frame.keys(xyz)):
-        assert counters[ids[i] % n_parts].keys[ids[i] // n_parts] == key
+        counter.add(xyz, start, stop, ids)
+    assert counter.n_cells == len(cells_of(xyz, edge))
+    assert_array_equal(counter.keys[ids], frame.keys(xyz))
 
 
 def test_that_a_key_is_found_where_it_was_put_and_an_absent_one_nowhere(rng):
@@ -204,6 +191,16 @@ def test_that_a_hash_of_places_is_that_of_the_coordinates_bits(rng):
         bits = map(int, p.view(np.uint64))
         mixed = sum(b * f for b, f in zip(bits, factors, strict=True)) % 2**64
         assert row == (mixed ^ (mixed >> 31)) * factors[0] % 2**64
+
+
+def test_that_places_are_drawn_by_their_hashes(rng):
+    xyz = rng.normal(size=(3000, 3))
+    hashes = np.empty(2900, np.uint64)
+    spacing.hash_places(xyz, 50, 2950, hashes)
+    bound, drawn = np.sort(hashes)[99], np.empty(2900, np.int64)
+    n = spacing.draw_places(xyz, 50, 2950, bound, drawn)
+    assert_array_equal(drawn[:n], 50 + np.flatnonzero(hashes <= bound))
+    assert n == 100
 
 
 def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):

@@ -10,7 +10,7 @@ from pipecore.progress import NoProgress
 from pipecore.segments import MIN_SEGMENT, Overlay, overlay_stacks
 from pipecore.settings import ProfileSettings
 from pipecore.types import NO_ID, Stack
-from tests.core.shapes import part_of, sampled, tube
+from tests.core.shapes import parents, part_of, sampled, tube
 
 
 def curves_of(groups, direction=(1.0, 0.0, 0.0)) -> Curves:
@@ -79,7 +79,7 @@ def test_that_a_pipe_is_one_segment_where_stacks_of_different_directions_overlap
     ]
     surface = sampled(*parts, voxel_mm=10)
     part = np.empty(len(surface.xyz), int)
-    part[surface.parent] = part_of(*parts)
+    part[parents(surface.behind)] = part_of(*parts)
     directions = (d, np.array([0.8, 0.6, 0.0]))
     curves = [
         segment_profiles(surface, Stack(i, e, 0.02), ProfileSettings(), 5.0)

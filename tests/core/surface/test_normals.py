@@ -12,6 +12,7 @@ from pipecore.types import PointCloud
 from tests.core.shapes import (
     angle_between,
     ball,
+    parents,
     plane,
     random_direction,
     random_rotation,
@@ -64,7 +65,7 @@ def test_that_normals_of_curved_surfaces_are_radial(rng, shape):
             surface = sampled(tube(rng, axis, R, spacing=0.005, noise=noise), voxel_mm=10)
             chainage = axis.pipe_coordinates(surface.xyz)[0]
             surface = Surface(
-                surface.xyz, surface.normals, surface.spacing, surface.parent, 0.01, surface.noise
+                surface.xyz, surface.normals, surface.spacing, surface.behind, 0.01, surface.noise
             )
             true = unit_rows(surface.xyz - axis.at(chainage))
         error = angle_between(surface.normals, true)
@@ -91,7 +92,7 @@ def test_that_lonely_points_have_no_normal(rng):
         [plane(rng, np.zeros(3), [0.3, 0, 0], [0, 0.3, 0])[0], [[2.0, 2.0, 2.0], [-2.0, 1.0, 0.5]]]
     )
     surface = sample_surface(PointCloud(np.zeros(3), xyz), ThinningSettings(), NoProgress())
-    lonely = surface.parent[-2:]
+    lonely = parents(surface.behind)[-2:]
     assert np.isnan(surface.normals[lonely]).all()
     assert np.isfinite(np.delete(surface.normals, lonely, axis=0)).mean() > 0.99
 

@@ -13,7 +13,7 @@ from pipecore.settings import ThinningSettings
 from pipecore.surface import median_spacing, thin
 from pipecore.surface.spacing import sample_by_place
 from pipecore.types import PointCloud
-from tests.core.shapes import cloud_of, plane, random_direction, tube
+from tests.core.shapes import cloud_of, parents, plane, random_direction, tube
 
 
 def pipe(rng, **kwargs):
@@ -32,7 +32,7 @@ def test_that_shuffled_points_thin_to_the_same_bits(rng, dtype, voxel_mm):
     once = thin(cloud, settings, NoProgress())
     again = thin(replace(cloud, xyz=cloud.xyz[shuffled]), settings, NoProgress())
     assert_array_equal(again.xyz, once.xyz)
-    assert_array_equal(again.parent, once.parent[shuffled])
+    assert_array_equal(parents(again.behind), parents(once.behind)[shuffled])
 
 
 def test_that_the_automatic_voxel_does_not_depend_on_the_order_of_the_points(rng):
@@ -45,9 +45,10 @@ def test_that_a_thinned_point_is_the_mean_of_the_points_that_name_it(rng):
     cloud = cloud_of(pipe(rng))
     thinned = thin(cloud, ThinningSettings(20.0), NoProgress())
     assert len(thinned.xyz) < len(cloud) / 4
-    assert set(thinned.parent) == set(range(len(thinned.xyz)))
+    parent = parents(thinned.behind)
+    assert set(parent) == set(range(len(thinned.xyz)))
     for k in rng.choice(len(thinned.xyz), 50):
-        members = cloud.xyz[thinned.parent == k]
+        members = cloud.xyz[parent == k]
         assert_allclose(thinned.xyz[k], members.mean(axis=0), atol=1e-6)
         assert np.ptp(members, axis=0).max() <= 0.02 + 1e-12
 

@@ -24,7 +24,7 @@ from pipecore.tiling.quantile import quantile
 from pipecore.tiling.store import temporary_store
 from pipecore.tiling.thinning import MARGIN, parts_of, slab_bounds
 from pipecore.types import PointCloud
-from tests.core.shapes import cloud_of, plane, tube
+from tests.core.shapes import cloud_of, parents, plane, tube
 
 
 def pipe_cloud(rng) -> PointCloud:
@@ -60,7 +60,7 @@ def test_that_the_voxels_of_a_part_are_those_of_the_whole(rng):
     whole = average_voxels(xyz, edge)
     part = np.floor(xyz[:, 0].astype(np.float64) / edge) < 30
     assert_array_equal(
-        average_voxels(xyz[part], edge).xyz, whole.xyz[np.unique(whole.parent[part])]
+        average_voxels(xyz[part], edge).xyz, whole.xyz[np.unique(parents(whole.behind)[part])]
     )
 
 

@@ -1,0 +1,109 @@
+"""Points in the order of the cubic cells they lie in, by a radix sort in buckets.
+
+Cells are numbered as `GridFrame` does. A bucket holds the points of a range of numbers, so
+that buckets are sorted beside each other, each in the processor's cache.
+"""
+
+import numpy as np
+from numba import njit
+
+from pipecore._kernels.voxels import voxel_key
+
+DIGIT_BITS = 10
+
+
+@njit(cache=True, nogil=True)
+def find_bounds(xyz, start, stop, corners):
+    """Write the lowest and the highest coordinates of the points start … stop."""
+    x, y, z = xyz[start, 0], xyz[start, 1], xyz[start, 2]
+    low_x, low_y, low_z = x, y, z
+    high_x, high_y, high_z = x, y, z
+    for i in range(start + 1, stop):
+        x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+        low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
+        high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
+    corners[0, 0], corners[0, 1], corners[0, 2] = low_x, low_y, low_z
+    corners[1, 0], corners[1, 1], corners[1, 2] = high_x, high_y, high_z
+
+
+@njit(cache=True, nogil=True)
+def count_bins(xyz, start, stop, first, edge, n_y, n_z, shift, counts):
+    """Count the points start … stop whose cells' numbers share all but the `shift` last bits."""
+    for i in range(start, stop):
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        counts[key >> shift] += 1
+
+
+@njit(cache=True, nogil=True)
+def put_in_buckets(xyz, start, stop, first, edge, n_y, n_z, shift, bucket_of_bin, places, order):
+    """Write the points start … stop to their buckets' next `places`, which go on."""
+    for i in range(start, stop):
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        bucket = bucket_of_bin[key >> shift]
+        order[places[bucket]] = i
+        places[bucket] += 1
+
+
+@njit(cache=True, nogil=True)
+def sort_bucket(xyz, first, edge, n_y, n_z, order, begins):
+    """Sort the points that `order` lists by their cells, stably; mark where each cell begins."""
+    n = order.shape[0]
+    if n == 0:
+        return
+    keys = np.empty(n, np.int64)
+    for k in range(n):
+        i = order[k]
+        keys[k] = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+    lowest = keys.min()
+    largest = keys.max() - lowest
+    keys -= lowest
+    points, other_keys, other_points = order.copy(), np.empty_like(keys), np.empty_like(order)
+    n_digits = 1 << DIGIT_BITS
+    place = np.empty(n_digits, np.int64)
+    shift = 0
+    while largest >> shift > 0:
+        place[:] = 0
+        for key in keys:
+            place[(key >> shift) & (n_digits - 1)] += 1
+        total = 0
+        for digit in range(n_digits):
+            count = place[digit]
+            place[digit] = total
+            total += count
+        for k in range(n):
+            digit = (keys[k] >> shift) & (n_digits - 1)
+            to = place[digit]
+            other_keys[to] = keys[k]
+            other_points[to] = points[k]
+            place[digit] = to + 1
+        keys, other_keys = other_keys, keys
+        points, other_points = other_points, points
+        shift += DIGIT_BITS
+    for k in range(n):
+        order[k] = points[k]
+        begins[k] = k == 0 or keys[k] != keys[k - 1]
+
+
+@njit(cache=True, nogil=True)
+def take_points(xyz, order, start, stop, taken):
+    """Write the points that `order` lists from start to stop."""
+    for k in range(start, stop):
+        i = order[k]
+        taken[k, 0], taken[k, 1], taken[k, 2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+
+
+@njit(cache=True, nogil=True)
+def mean_points(xyz, order, starts, first, last, means):
+    """Write the means of the points of cells first … last, which `order` lists cell by cell.
+
+    Points are added up in whole micrometres, so that their order does not matter.
+    """
+    for c in range(first, last):
+        x = y = z = np.int64(0)
+        for k in range(starts[c], starts[c + 1]):
+            i = order[k]
+            x += np.int64(round(xyz[i, 0] * 1e6))
+            y += np.int64(round(xyz[i, 1] * 1e6))
+            z += np.int64(round(xyz[i, 2] * 1e6))
+        n = 1e6 * (starts[c + 1] - starts[c])
+        means[c, 0], means[c, 1], means[c, 2] = x / n, y / n, z / n
