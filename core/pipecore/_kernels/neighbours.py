@@ -5,11 +5,16 @@ import math
 import numpy as np
 from numba import njit
 
-from pipecore._kernels.eigen import eigenvalues, eigenvector
+from pipecore._kernels.eigen import eigenvalues, eigenvector, least_eigenpair
 from pipecore._kernels.voxels import EMPTY, slot_of
 
 LANES = 16
-FAR_OFF = 1e30
+FAR_OFF = np.float32(1e18)
+BATCH = 256
+"""Points whose planes are solved for together."""
+N_SUMS = 10
+_ROWS = np.array([0, 0, 9, 34, 83, 164])
+"""Where the rows of cells of each reach begin among those of all reaches."""
 
 
 @njit(cache=True, nogil=True)
@@ -36,67 +41,94 @@ def fit_planes(
     nan where there are too few.
     """
     first, last = np.empty(81, np.int64), np.empty(81, np.int64)
-    begins = np.empty(9, np.int64)
-    for row in range(9):
-        step = (row // 3 - 1) * n_y + row % 3 - 1
-        begins[row] = np.searchsorted(cell_keys, cell_keys[start] + step * n_z - 1)
-    near = np.empty((3, 512))
+    begins = np.zeros(_ROWS[-1], np.int64)
+    near = np.empty((3, 512), np.float32)
+    sums, reaches = np.empty((N_SUMS, BATCH)), np.empty(BATCH)
+    points, planes = np.empty(BATCH, np.int64), np.empty((5, BATCH))
+    n_points = 0
+    r2 = np.float32(radius * radius)
     for c in range(start, stop):
-        reach, n_near = 0, 0
+        # Looked up once for all points of the cell, and copied side by side.
+        reach = 1
+        n_ranges = list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last)
+        n_near = 0
+        for k in range(n_ranges):
+            n_near += last[k] - first[k]
+        if n_near + LANES > near.shape[1]:
+            near = np.empty((3, 2 * n_near + LANES), np.float32)
+        zero = cell_starts[c]
+        n_near = copy_ranges(xyz, zero, n_ranges, first, last, near)
         for i in range(cell_starts[c], cell_starts[c + 1]):
-            px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+            if n_points == BATCH:
+                solve_planes(n_points, sums, reaches, planes)
+                write_planes(n_points, planes, points, normals, residuals, spacings)
+                n_points = 0
+            own = sums[:, n_points]
+            sums_within(
+                near[0, :n_near],
+                near[1, :n_near],
+                near[2, :n_near],
+                np.float32(xyz[i, 0] - xyz[zero, 0]),
+                np.float32(xyz[i, 1] - xyz[zero, 1]),
+                np.float32(xyz[i, 2] - xyz[zero, 2]),
+                r2,
+                own,
+            )
+            reaches[n_points] = radius
+            if own[0] < min_neighbours:
+                for quarters in (5, 6, 7, 8, 10, 12, 16):
+                    if reach != (quarters + 3) // 4:
+                        reach = (quarters + 3) // 4
+                        n_ranges = list_ranges(
+                            c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last
+                        )
+                    reaches[n_points] = 0.25 * quarters * radius
+                    sum_ranges(xyz, i, n_ranges, first, last, reaches[n_points], own)
+                    if own[0] >= min_neighbours:
+                        break
             at = places[i]
-            normals[at, 0] = normals[at, 1] = normals[at, 2] = math.nan
-            residuals[at] = spacings[at] = math.nan
-            for quarters in (4, 5, 6, 7, 8, 10, 12, 16):
-                if reach != (quarters + 3) // 4:
-                    # Looked up once for all points of the cell, and copied side by side.
-                    reach = (quarters + 3) // 4
-                    n_ranges = list_ranges(
-                        c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last
-                    )
-                    n_near = 0
-                    for k in range(n_ranges):
-                        n_near += last[k] - first[k]
-                    if n_near + LANES > near.shape[1]:
-                        near = np.empty((3, 2 * n_near + LANES))
-                    n_near = 0
-                    for k in range(n_ranges):
-                        for j in range(first[k], last[k]):
-                            near[0, n_near] = xyz[j, 0]
-                            near[1, n_near] = xyz[j, 1]
-                            near[2, n_near] = xyz[j, 2]
-                            n_near += 1
-                    # Whole lanes; what fills them is out of reach.
-                    while n_near % LANES > 0:
-                        near[0, n_near] = near[1, n_near] = near[2, n_near] = FAR_OFF
-                        n_near += 1
-                r2 = (0.25 * quarters * radius) ** 2
-                n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz = sums_within(
-                    near[0, :n_near], near[1, :n_near], near[2, :n_near], px, py, pz, r2
-                )
-                if n >= min_neighbours:
-                    mx, my, mz = sx / n, sy / n, sz / n
-                    xx, xy, xz = sxx / n - mx * mx, sxy / n - mx * my, sxz / n - mx * mz
-                    yy, yz, zz = syy / n - my * my, syz / n - my * mz, szz / n - mz * mz
-                    least, _, _ = eigenvalues(xx, xy, xz, yy, yz, zz)
-                    x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
-                    normals[at, 0], normals[at, 1], normals[at, 2] = x, y, z
-                    residuals[at] = math.sqrt(max(least, 0.0) * n / (n - 3.0))
-                    spacings[at] = 0.25 * quarters * radius * math.sqrt(math.pi / n)
-                    break
+            if own[0] >= min_neighbours:
+                points[n_points] = at
+                n_points += 1
+            else:
+                normals[at, 0] = normals[at, 1] = normals[at, 2] = math.nan
+                residuals[at] = spacings[at] = math.nan
+    solve_planes(n_points, sums, reaches, planes)
+    write_planes(n_points, planes, points, normals, residuals, spacings)
+
+
+@njit(cache=True, nogil=True)
+def copy_ranges(xyz, zero, n_ranges, first, last, near):
+    """Copy the points of some ranges, relative to the point `zero`; return their number.
+
+    Filled up to whole lanes by what is out of reach.
+    """
+    x, y, z = xyz[zero, 0], xyz[zero, 1], xyz[zero, 2]
+    n = 0
+    for k in range(n_ranges):
+        for j in range(first[k], last[k]):
+            near[0, n] = xyz[j, 0] - x
+            near[1, n] = xyz[j, 1] - y
+            near[2, n] = xyz[j, 2] - z
+            n += 1
+    while n % LANES > 0:
+        near[0, n] = near[1, n] = near[2, n] = FAR_OFF
+        n += 1
+    return n
 
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
-def sums_within(xs, ys, zs, px, py, pz, r2):
-    """Count, sums and sums of products of the points within reach of one, relative to it.
+def sums_within(xs, ys, zs, px, py, pz, r2, sums):
+    """Write count, sums and sums of products of the points within reach of one, relative to it.
 
-    Added up in lanes side by side: several times as fast as one after the other.
+    All in single precision, a ten millionth of the reach, and added up in lanes side by side:
+    many times as fast as one after the other.
     """
-    n = sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = 0.0
+    none, one = np.float32(0.0), np.float32(1.0)
+    n = sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = none
     for j in range(xs.shape[0]):
         x, y, z = xs[j] - px, ys[j] - py, zs[j] - pz
-        w = 1.0 if x * x + y * y + z * z <= r2 else 0.0
+        w = one if x * x + y * y + z * z <= r2 else none
         wx, wy, wz = w * x, w * y, w * z
         n += w
         sx += wx
@@ -108,7 +140,52 @@ def sums_within(xs, ys, zs, px, py, pz, r2):
         syy += wy * y
         syz += wy * z
         szz += wz * z
-    return n, sx, sy, sz, sxx, sxy, sxz, syy, syz, szz
+    sums[0], sums[1], sums[2], sums[3] = n, sx, sy, sz
+    sums[4], sums[5], sums[6] = sxx, sxy, sxz
+    sums[7], sums[8], sums[9] = syy, syz, szz
+
+
+@njit(cache=True, nogil=True)
+def sum_ranges(xyz, i, n_ranges, first, last, reach, sums):
+    """Write what `sums_within` does, of the points of some ranges within `reach` of a point."""
+    px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
+    sums[:] = 0.0
+    for k in range(n_ranges):
+        for j in range(first[k], last[k]):
+            x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
+            if x * x + y * y + z * z <= reach * reach:
+                sums[0] += 1.0
+                sums[1] += x
+                sums[2] += y
+                sums[3] += z
+                sums[4] += x * x
+                sums[5] += x * y
+                sums[6] += x * z
+                sums[7] += y * y
+                sums[8] += y * z
+                sums[9] += z * z
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def solve_planes(n_points, sums, reaches, planes):
+    """Write the normal, residual and spacing of the neighbourhoods with the given sums."""
+    for i in range(n_points):
+        n = sums[0, i]
+        x, y, z = sums[1, i] / n, sums[2, i] / n, sums[3, i] / n
+        xx, xy, xz = sums[4, i] / n - x * x, sums[5, i] / n - x * y, sums[6, i] / n - x * z
+        yy, yz, zz = sums[7, i] / n - y * y, sums[8, i] / n - y * z, sums[9, i] / n - z * z
+        least, planes[0, i], planes[1, i], planes[2, i] = least_eigenpair(xx, xy, xz, yy, yz, zz)
+        planes[3, i] = math.sqrt(max(least, 0.0) * n / (n - 3.0))
+        planes[4, i] = reaches[i] * math.sqrt(math.pi / n)
+
+
+@njit(cache=True, nogil=True)
+def write_planes(n_points, planes, points, normals, residuals, spacings):
+    """Write what was found of each point to its place."""
+    for i in range(n_points):
+        at = points[i]
+        normals[at, 0], normals[at, 1], normals[at, 2] = planes[0, i], planes[1, i], planes[2, i]
+        residuals[at], spacings[at] = planes[3, i], planes[4, i]
 
 
 @njit(cache=True, nogil=True)
@@ -116,28 +193,47 @@ def list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last)
     """List the ranges of points of the cells within `reach` of cell `c`; return their number.
 
     Cells are numbered row by row, so that those of a row lie side by side. Where the rows
-    of the next cells begin is kept in `begins` from call to call, which are made for rising
-    cells; wider reaches are rare and searched for.
+    around begin is kept in `begins` from call to call, which are made for rising cells.
     """
+    n_cells = cell_keys.shape[0]
+    row = _ROWS[reach]
     n = 0
     for dx in range(-reach, reach + 1):
         for dy in range(-reach, reach + 1):
             low = cell_keys[c] + (dx * n_y + dy) * n_z - reach
-            if reach == 1:
-                row = 3 * dx + dy + 4
-                begin = begins[row]
-                while begin < cell_keys.shape[0] and cell_keys[begin] < low:
-                    begin += 1
-                begins[row] = begin
-            else:
-                begin = np.searchsorted(cell_keys, low)
+            begin = first_from(cell_keys, begins[row], low)
+            begins[row] = begin
+            row += 1
             end = begin
-            while end < cell_keys.shape[0] and cell_keys[end] <= low + 2 * reach:
+            while end < n_cells and cell_keys[end] <= low + 2 * reach:
                 end += 1
             if end > begin:
                 first[n], last[n] = cell_starts[begin], cell_starts[end]
                 n += 1
     return n
+
+
+@njit(cache=True, nogil=True)
+def first_from(keys, begin, low):
+    """Position of the first of ascending keys, from `begin` on, that is not below `low`.
+
+    Found in growing steps: it is mostly near.
+    """
+    n = keys.shape[0]
+    if begin >= n or keys[begin] >= low:
+        return begin
+    step = 1
+    while begin + step < n and keys[begin + step] < low:
+        begin += step
+        step *= 2
+    begin, end = begin + 1, min(begin + step, n)
+    while begin < end:
+        middle = (begin + end) // 2
+        if keys[middle] < low:
+            begin = middle + 1
+        else:
+            end = middle
+    return begin
 
 
 @njit(cache=True, nogil=True)

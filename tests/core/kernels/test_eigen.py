@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore._kernels.eigen import eigenvalues, eigenvector
+from pipecore._kernels.eigen import eigenvalues, eigenvector, least_eigenpair
 
 pytestmark = pytest.mark.kernels
 
@@ -50,3 +50,27 @@ def test_that_the_smallest_eigenvalue_of_points_in_a_plane_is_nothing_and_its_ve
     least, _, largest = eigenvalues(*upper(matrix))
     assert abs(least) < 1e-14 * largest
     assert abs(np.array(eigenvector(*upper(matrix), least)) @ q[2]) > 1 - 1e-12
+
+
+@pytest.mark.parametrize("scale", [1e-8, 1.0, 1e6])
+def test_that_the_least_eigenpair_is_that_of_the_closed_form(rng, scale):
+    shapes = [(1.0, 1.0, 1.0), (1.0, 0.7, 0.0), (1.0, 1.0, 1e-3), (1.0, 1e-3, 1e-3)]
+    for shape in shapes * 10:
+        a = rng.normal(size=(3, 12)) * np.array(shape)[:, None]
+        q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        matrix = scale * q @ a @ a.T @ q.T
+        values, vectors = np.linalg.eigh(matrix)
+        value, *vector = least_eigenpair(*upper(matrix))
+        gap = (values[1] - values[0]) / values[2]
+        atol = min(1e-15 / max(gap, 1e-16) + 2e-14, 4e-8) * values[2]
+        assert value == pytest.approx(values[0], abs=atol, rel=0)
+        if gap > 1e-4:
+            assert np.linalg.norm(vector) == pytest.approx(1.0)
+            assert abs(np.array(vector) @ vectors[:, 0]) > 1 - 1e-12 / gap**2
+
+
+def test_that_a_multiple_least_eigenvalue_has_no_vector():
+    for matrix in ((2.0, 0.0, 0.0, 2.0, 0.0, 2.0), (0.0,) * 6):
+        value, *vector = least_eigenpair(*matrix)
+        assert value == matrix[0]
+        assert np.isnan(vector).all()

@@ -120,7 +120,8 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
         near = xyz[distance <= reach * radius]
         values, vectors = np.linalg.eigh(np.cov(near.T, bias=True))
         assert abs(normals[i] @ vectors[:, 0]) == pytest.approx(1.0, abs=1e-6)
-        assert residuals[i] == pytest.approx(np.sqrt(values[0] * len(near) / (len(near) - 3)))
+        residual = np.sqrt(values[0] * len(near) / (len(near) - 3))
+        assert residuals[i] == pytest.approx(residual, rel=1e-5, abs=1e-5)
         assert spacings[i] == pytest.approx(np.sqrt(np.pi * (reach * radius) ** 2 / len(near)))
     assert {1, None} < set(reaches)
     assert max(r or 0 for r in reaches) >= 2
@@ -225,9 +226,23 @@ def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):
 
 
 def test_that_sums_are_those_of_the_points_within_reach(rng):
-    xyz, p, reach = rng.uniform(0, 1, (200, 3)), np.array([0.4, 0.5, 0.6]), 0.4
-    near = xyz[np.linalg.norm(xyz - p, axis=1) <= reach] - p
-    n, *sums = neighbours.sums_within(*xyz.T.copy(), *p, reach**2)
-    assert n == len(near) > 5
+    xyz, reach = rng.uniform(0, 1, (200, 3)), 0.4
+    xyz[7] = [0.4, 0.5, 0.6]
+    near = xyz[np.linalg.norm(xyz - xyz[7], axis=1) <= reach] - xyz[7]
     products = near.T @ near
-    assert_allclose(sums, [*near.sum(axis=0), *products[np.triu_indices(3)]], atol=1e-12)
+    expected = [len(near), *near.sum(axis=0), *products[np.triu_indices(3)]]
+    assert len(near) > 5
+    columns, place = xyz.T.astype(np.float32), xyz[7].astype(np.float32)
+    sums = np.full(10, np.nan)
+    neighbours.sums_within(*columns, *place, np.float32(reach**2), sums)
+    assert_allclose(sums, expected, atol=1e-5)
+    neighbours.sum_ranges(xyz, 7, 2, np.array([0, 90]), np.array([90, 200]), reach, sums)
+    assert_allclose(sums, expected, atol=1e-12)
+
+
+def test_that_the_first_key_from_a_place_on_is_found(rng):
+    keys = np.unique(rng.integers(0, 3000, 400))
+    for begin in (0, 3, 200, len(keys) - 1, len(keys)):
+        for low in (0, *rng.integers(0, 3100, 30), 4000):
+            expected = max(begin, np.searchsorted(keys, low))
+            assert neighbours.first_from(keys, begin, low) == expected
