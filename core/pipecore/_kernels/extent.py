@@ -6,6 +6,10 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.grouping import group_by_label
+from pipecore._kernels.series import solve_in_place
+
+OVAL_SECTORS = 36
+"""Sectors around the axis whose means tell an oval section."""
 
 
 @njit(cache=True, nogil=True)
@@ -17,6 +21,15 @@ def upper_medians(values, group, medians):
         a, b = starts[k], starts[k + 1]
         middle = (b - a) // 2
         medians[k] = np.partition(ordered[a:b], middle)[middle] if b > a else math.inf
+
+
+@njit(cache=True, nogil=True)
+def rows_of(chainage, base, step):
+    """Number of the step of axis of each point."""
+    row = np.empty(chainage.shape[0], np.int64)
+    for i in range(chainage.shape[0]):
+        row[i] = math.floor((chainage[i] - base) / step)
+    return row
 
 
 @njit(cache=True, nogil=True)
@@ -59,3 +72,172 @@ def turn_of_normals(clock, lean, group, turning):
             if spread > 1e-12 * moments[k, 2]:
                 together = moments[k, 3] - moments[k, 0] * moments[k, 1] / n
                 turning[k] = 1.0 + together / spread
+
+
+@njit(cache=True, nogil=True)
+def off_oval(clock, residual, row, n_rows, n_sectors, least_arc, most):
+    """Distance of points from the oval section of their row; from the circle where none is told.
+
+    An oval is told by the means of the sectors of three rows if they show more than
+    `least_arc`; it is the second harmonic only, up to the amplitude `most`.
+    """
+    count, total = np.zeros((n_rows, n_sectors)), np.zeros((n_rows, n_sectors))
+    for i in range(clock.shape[0]):
+        k = int(clock[i] / (2.0 * math.pi) * n_sectors) % n_sectors
+        count[row[i], k] += 1.0
+        total[row[i], k] += residual[i]
+    terms = np.empty((n_sectors, 5))
+    for k in range(n_sectors):
+        angle = (k + 0.5) * (2.0 * math.pi / n_sectors)
+        terms[k, 0] = 1.0
+        terms[k, 1], terms[k, 2] = math.cos(angle), math.sin(angle)
+        terms[k, 3], terms[k, 4] = math.cos(2.0 * angle), math.sin(2.0 * angle)
+    second = np.zeros((n_rows, 2))
+    normal, right = np.empty((5, 5)), np.empty(5)
+    for r in range(n_rows):
+        normal[:, :] = 0.0
+        right[:] = 0.0
+        n_seen = 0
+        for k in range(n_sectors):
+            n, mean = 0.0, 0.0
+            for near in (max(r - 1, 0), r, min(r + 1, n_rows - 1)):
+                n += count[near, k]
+                mean += total[near, k]
+            if n == 0.0:
+                continue
+            n_seen += 1
+            mean /= n
+            for a in range(5):
+                right[a] += terms[k, a] * mean
+                for b in range(a + 1):
+                    normal[a, b] += terms[k, a] * terms[k, b]
+        if n_seen * (2.0 * math.pi / n_sectors) <= least_arc:
+            continue
+        for a in range(5):
+            normal[a, a] += 1e-6
+        solve_in_place(normal, right)
+        if math.hypot(right[3], right[4]) < most:
+            second[r, 0], second[r, 1] = right[3], right[4]
+    off = np.empty(clock.shape[0])
+    for i in range(clock.shape[0]):
+        cos, sin = math.cos(2.0 * clock[i]), math.sin(2.0 * clock[i])
+        off[i] = abs(residual[i] - second[row[i], 0] * cos - second[row[i], 1] * sin)
+    return off
+
+
+@njit(cache=True, nogil=True)
+def cover_rows(chainage, clock, residual, lean, length, radius, base, step, n_sectors, limits):
+    """Tell which steps of axis from `base` on are covered; see `find_extent`.
+
+    `limits` are: share of the usual arc, arc that is always enough, share of the usual arc
+    that is, furthest median from the surface, arc and amplitude of ovals and the share that
+    they leave, and the least turning. Returns the arc of each step, the covered steps, and
+    how many of them are in the proposed extent.
+    """
+    share, enough, share_enough, max_off, oval_arc, max_oval, oval_share, min_turning = limits
+    row = rows_of(chainage, base, step)
+    n_rows = row.max() + 1
+    seen = np.empty((n_rows, n_sectors), np.bool_)
+    mark_sectors(row, clock, seen)
+    arc, in_core = np.zeros(n_rows), np.zeros(n_rows, np.bool_)
+    for k in range(n_rows):
+        for m in range(n_sectors):
+            arc[k] += seen[k, m]
+        arc[k] *= 2.0 * math.pi / n_sectors
+        in_core[k] = 0.0 < base + (k + 0.5) * step < length
+    covered = np.empty(n_rows, np.int64)
+    if not in_core.any():
+        return arc, covered[:0], 0
+    usual_arc = np.quantile(arc[in_core], 0.75)
+    off = np.empty(n_rows)
+    upper_medians(np.abs(residual), row, off)
+    if np.any((off >= max_off) & (arc > oval_arc)):
+        # An oval stretch of a pipe is off the circle, and still the pipe.
+        of_oval = np.empty(n_rows)
+        from_oval = off_oval(
+            clock, residual, row, n_rows, OVAL_SECTORS, oval_arc, max_oval * radius
+        )
+        upper_medians(from_oval, row, of_oval)
+        for k in range(n_rows):
+            if of_oval[k] < oval_share * off[k]:
+                off[k] = of_oval[k]
+    turning = np.empty(n_rows)
+    turn_of_normals(clock, lean, row, turning)
+    least_arc = max(share * usual_arc, min(enough, share_enough * usual_arc))
+    n = n_core = 0
+    for k in range(n_rows):
+        if arc[k] >= least_arc and off[k] < max_off and turning[k] > min_turning:
+            covered[n] = k
+            n += 1
+            n_core += in_core[k]
+    return arc, covered[:n], n_core
+
+
+@njit(cache=True, nogil=True)
+def arcs_in_gaps(chainage, clock, base, step, covered, n_sectors):
+    """Arc that points show between each covered step and the next one."""
+    first, n_rows = covered[0], covered[-1] + 1 - covered[0]
+    seen = np.empty((n_rows, n_sectors), np.bool_)
+    mark_sectors(rows_of(chainage, base, step) - first, clock, seen)
+    arcs = np.zeros(covered.shape[0] - 1)
+    for k in range(covered.shape[0] - 1):
+        for m in range(n_sectors):
+            for r in range(covered[k] + 1 - first, covered[k + 1] - first):
+                if seen[r, m]:
+                    arcs[k] += 2.0 * math.pi / n_sectors
+                    break
+    return arcs
+
+
+@njit(cache=True, nogil=True)
+def best_part(covered, arcs_inside, base, step, length, longest_gap, most_arc):
+    """First and last place, in `covered`, of the part with most steps of the proposed extent.
+
+    Parts end at gaps that are long, or in which much of an arc shows.
+    """
+    n = covered.shape[0]
+    best, first, last, start, inside = -1, 0, 0, 0, 0
+    for k in range(n):
+        inside += 0.0 < base + (covered[k] + 0.5) * step < length
+        is_end = k == n - 1 or (
+            (covered[k + 1] - covered[k]) * step > longest_gap or arcs_inside[k] > most_arc
+        )
+        if is_end:
+            if inside > best:
+                best, first, last = inside, start, k
+            start, inside = k + 1, 0
+    return first, last
+
+
+@njit(cache=True, nogil=True)
+def bounds_of(chainage, base, step, first, last):
+    """Least chainage of the points of one step and largest of those of another."""
+    low, high = math.inf, -math.inf
+    for c in chainage:
+        k = math.floor((c - base) / step)
+        if k == first:
+            low = min(low, c)
+        if k == last:
+            high = max(high, c)
+    return low, high
+
+
+@njit(cache=True, nogil=True)
+def points_between(own, chainage, clock, residual, low, high, clear, least):
+    """Points within an extent: index, clock and residual; and those clear of its ends.
+
+    Where `least` or fewer are clear of the ends all are taken.
+    """
+    n_most = own.shape[0]
+    index, core = np.empty(n_most, own.dtype), np.empty(n_most, own.dtype)
+    clocks, residuals = np.empty(n_most), np.empty(n_most)
+    n = n_core = 0
+    for i in range(n_most):
+        if low <= chainage[i] <= high:
+            index[n], clocks[n], residuals[n] = own[i], clock[i], residual[i]
+            n += 1
+            if low + clear <= chainage[i] <= high - clear:
+                core[n_core] = own[i]
+                n_core += 1
+    chosen = core[:n_core] if n_core > least else index[:n]
+    return index[:n], clocks[:n], residuals[:n], chosen

@@ -224,7 +224,7 @@ def points_on(
     That are points within `band` of it, between two distances from the axis, with normals
     like its own (cosine above `min_cos`); of the cells' points only every `stride`-th is
     looked at. Returns, in the order of their indices, the indices
-    and (n, 4): distance, chainage, clock, and the angle from the surface's normal to the
+    and (4, n): distance, chainage, clock, and the angle from the surface's normal to the
     point's own towards increasing clock.
     """
     found, table = np.empty(256, np.int64), np.empty((256, 4))
@@ -261,7 +261,54 @@ def points_on(
             table[n, 3] = math.atan(ahead / cosine)
             n += 1
     order = argsort_keys(found[:n])
-    return found[:n][order], table[:n][order]
+    columns = np.empty((4, n))
+    for k in range(n):
+        for column in range(4):
+            columns[column, k] = table[order[k], column]
+    return found[:n][order], columns
+
+
+@njit(cache=True, nogil=True)
+def stride_of(starts, cells, few):
+    """Every how many-th point of some cells to look at, so that there are not more than few."""
+    n = 0
+    for c in cells:
+        n += starts[c + 1] - starts[c]
+    return max(1, -(-n // few)) if few > 0 else 1
+
+
+@njit(cache=True, nogil=True)
+def usual_spacing(spacing, chosen, least):
+    """Median distance of chosen points to their neighbours where it is known; not below `least`."""
+    known = np.empty(chosen.shape[0])
+    n = 0
+    for i in chosen:
+        if not math.isnan(spacing[i]):
+            known[n] = spacing[i]
+            n += 1
+    return max(least, np.median(known[:n])) if n > 0 else least
+
+
+@njit(cache=True, nogil=True)
+def look_on(
+    grid, xyz, normals, spacing, voxel, is_free, members, starts, axis, shell, inner, outer,
+    margin, kind, surface, band, min_cos, few,
+):  # fmt: skip
+    """Find the points on a surface about an axis; see `cells_around` and `points_on`.
+
+    Where cells hold more than `few` points a sample is looked at, if `few` is not 0. Returns
+    what `points_on` does and the distance between neighbours among the points looked at.
+    """
+    cells = cells_around(
+        grid[0], grid[1], grid[2], grid[3], grid[4], grid[5], grid[6], grid[7], grid[8],
+        axis, shell[0], shell[1], -margin, axis[16] + margin,
+    )  # fmt: skip
+    stride = stride_of(starts, cells, few)
+    own, columns = points_on(
+        xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
+        kind, surface, band, min_cos, stride,
+    )  # fmt: skip
+    return own, columns, usual_spacing(spacing, own, voxel) * math.sqrt(stride)
 
 
 @njit(cache=True, nogil=True)
@@ -269,7 +316,7 @@ def points_inside(
     xyz, normals, members, starts, cells, axis, inner, outer, begin, end,
     kind, surface, depth, min_cos,
 ):  # fmt: skip
-    """Chainage and clock (m, 2) of points deeper than `depth` inside a surface, as `points_on`.
+    """Chainage and clock (2, m) of points deeper than `depth` inside a surface, as `points_on`.
 
     Only between the chainages `begin` and `end`.
     """
@@ -295,7 +342,7 @@ def points_inside(
                     table = longer
                 table[n, 0], table[n, 1] = chainage, clock
                 n += 1
-    return table[:n]
+    return table[:n].T.copy()
 
 
 @njit(cache=True, nogil=True)

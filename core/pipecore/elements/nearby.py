@@ -171,13 +171,10 @@ class NearbyPoints:
         shell = inner, outer
         if not model.is_conical:
             shell = max(inner, model.radius - band), min(outer, model.radius + band)
-        cells = kernels.cells_around(*self._grid, numbers, *shell, -margin, axis.length + margin)
-        stride = self._stride(cells) if is_rough else 1
-        own, table = kernels.points_on(
-            *points, is_free, *self._cells, cells, numbers, inner, outer, margin,
-            *shape, band, min_cos, stride,
+        own, columns, spacing = kernels.look_on(
+            self._grid, *points, self.surface.spacing, self.surface.voxel, is_free, *self._cells,
+            numbers, shell, inner, outer, margin, *shape, band, min_cos, FEW if is_rough else 0,
         )  # fmt: skip
-        residual, chainage, clock, lean = np.ascontiguousarray(table.T)
 
         def look_inside(begin: float, end: float) -> Array:
             cells = kernels.cells_around(*self._grid, numbers, inner, outer, begin, end)
@@ -185,15 +182,10 @@ class NearbyPoints:
                 *points, *self._cells, cells, numbers, inner, outer, begin, end,
                 *shape, depth, min_cos,
             )  # fmt: skip
-            return found.T
+            return found
 
-        spacing = self.usual_spacing(own) * np.sqrt(stride)
+        residual, chainage, clock, lean = columns
         return PointsOn(own, residual, chainage, clock, lean, look_inside, spacing)
-
-    def _stride(self, cells: Indices) -> int:
-        """How many times as many points as few some cells hold."""
-        starts = self._cells[1]
-        return max(1, -int(-(starts[cells + 1] - starts[cells]).sum() // FEW))
 
     def on_sphere(
         self,
@@ -211,7 +203,7 @@ class NearbyPoints:
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
         inner = model.radius - band
         cells = kernels.cells_in_shell(*self._grid, model.centre, inner, outer)
-        stride = self._stride(cells) if is_rough else 1
+        stride = kernels.stride_of(self._cells[1], cells, FEW if is_rough else 0)
         return np.asarray(
             kernels.points_on_sphere(
                 self.surface.xyz, self.surface.normals, is_free, *self._cells, cells,
@@ -221,9 +213,7 @@ class NearbyPoints:
 
     def usual_spacing(self, thinned: Indices) -> float:
         """Distance between neighbours among some thinned points, not below the thinning's."""
-        if len(thinned) == 0:
-            return self.surface.voxel
-        return max(self.surface.voxel, float(np.nanmedian(self.surface.spacing[thinned])))
+        return float(kernels.usual_spacing(self.surface.spacing, thinned, self.surface.voxel))
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
         """Thinned points within `radius` of a place, in order."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore._kernels.extent import points_between
 from pipecore.elements.bands import is_off_bands
 from pipecore.elements.extent import (
     MAX_SECTORS,
@@ -42,6 +43,8 @@ MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 1_500
 LEAST_POINTS, SURE_POINTS, MANY_POINTS = 15, 4_000, 6_000
 """No fit takes fewer points. What early rounds are unsure of is judged as if they had used up
 to so many points. More than many are fitted to at last if so many of them hold."""
+LEAST_CLEAR = 30
+"""Points from which on a fit stays clear of the ends."""
 AGAIN = 1.5
 """A fit that starts from that of a sample takes so many times its standard deviation."""
 INSIDE = 0.1
@@ -147,20 +150,19 @@ def refine_piece(
             is_rough=not is_final,
         )  # fmt: skip
         used.append(near.own)
-        chainage, clock = near.chainage, near.clock
         extent = find_extent(
-            chainage, clock, near.residual, near.lean, near.inside,
+            near.chainage, near.clock, near.residual, near.lean, near.inside,
             axis.length, model.radius, near.spacing, sigma,
         )  # fmt: skip
         if extent is None:
             return None
-        within = (chainage >= extent.low) & (chainage <= extent.high)
         # Near the ends other surfaces begin, so the fit stays clear of them.
         clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
-        core = (chainage >= extent.low + clear) & (chainage <= extent.high - clear)
-        chosen = near.own[core if core.sum() > 30 else within]
-        misfit = section_misfit(clock[within], near.residual[within], extent.arc)
-        own = near.own[within]
+        own, own_clock, own_residual, chosen = points_between(
+            near.own, near.chainage, near.clock, near.residual,
+            extent.low, extent.high, clear, LEAST_CLEAR,
+        )  # fmt: skip
+        misfit = section_misfit(own_clock, own_residual, extent.arc)
         if is_final:
             told = partial(Fitted, axis=axis, own=own, extent=extent, misfit=misfit)
             assert fitted is not None

@@ -218,8 +218,9 @@ def test_that_a_bend_between_straights_has_its_bend_radius_within_its_uncertaint
     sd = np.sqrt(found.fit.covariance[5, 5])
     assert abs(found.fit.model.bend_radius - bend_radius) < 4.5 * sd + 0.002 * bend_radius
     assert found.axis.bend_angle == pytest.approx(np.deg2rad(turn_deg), rel=0.1)
-    assert found.fit.model.radius == pytest.approx(radius, abs=0.001)
-    assert sd < 0.1 * bend_radius
+    assert abs(found.fit.model.radius - radius) < 5.0 * found.fit.radius_sd + 0.001
+    # A bend by 30° has a few dozen points at the least.
+    assert sd < 0.3 * bend_radius
 
 
 def test_that_no_bend_is_fitted_where_only_straights_cross(rng, frame):

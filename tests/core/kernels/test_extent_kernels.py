@@ -47,3 +47,52 @@ def test_that_one_point_or_one_place_does_not_turn():
     group = np.array([0, 1, 1])
     extent.turn_of_normals(np.array([1.0, 2.0, 2.0]), np.zeros(3), group, turning)
     assert_array_equal(turning, [0.0, 0.0])
+
+
+def test_that_points_between_are_told_from_those_clear_of_the_ends(rng):
+    own, chainage = rng.permutation(60), rng.uniform(-1, 2, 60)
+    clock, residual = rng.normal(size=(2, 60))
+    for clear, least in ((0.2, 3), (0.2, 60)):
+        found = extent.points_between(own, chainage, clock, residual, 0.0, 1.0, clear, least)
+        within = (chainage >= 0.0) & (chainage <= 1.0)
+        core = (chainage >= clear) & (chainage <= 1.0 - clear)
+        chosen = own[core if core.sum() > least else within]
+        for one, other in zip(
+            found, (own[within], clock[within], residual[within], chosen), strict=True
+        ):
+            assert_array_equal(one, other)
+
+
+def test_that_the_arc_in_a_gap_is_that_of_all_its_rows(rng):
+    covered = np.array([2, 3, 6, 9])
+    chainage, clock = rng.uniform(0.0, 1.2, 40), rng.uniform(0, 2 * np.pi, 40)
+    arcs = extent.arcs_in_gaps(chainage, clock, 0.1, 0.1, covered, 12)
+    row = np.floor((chainage - 0.1) / 0.1)
+    for k in range(3):
+        inside = (row > covered[k]) & (row < covered[k + 1])
+        sectors = np.unique((clock[inside] // (np.pi / 6)).astype(int))
+        assert arcs[k] == pytest.approx(len(sectors) * np.pi / 6)
+
+
+def test_that_points_of_an_oval_section_are_not_off_it(rng):
+    row, clock = np.repeat([0, 1, 2], 400), rng.uniform(0, 2 * np.pi, 1200)
+    oval = 0.004 * np.cos(2 * clock - 0.7)
+    off = extent.off_oval(clock, oval, row, 3, 36, np.radians(200), 0.005)
+    assert off.max() < 6e-4
+    # Neither an oval beyond the limit nor one of which half is seen is taken off.
+    assert_allclose(extent.off_oval(clock, oval, row, 3, 36, 3.5, 0.003), np.abs(oval))
+    half = clock < np.pi
+    off = extent.off_oval(clock[half], oval[half], row[half], 3, 36, np.radians(200), 0.005)
+    assert_allclose(off, np.abs(oval[half]))
+
+
+def test_that_the_best_part_has_most_of_what_was_proposed():
+    covered, nothing = np.array([0, 1, 2, 3, 9, 10, 11, 12, 13]), np.zeros(8)
+    assert extent.best_part(covered, nothing, 0.0, 0.1, 1.2, 0.5, 1.0) == (0, 3)
+    assert extent.best_part(covered, nothing, -0.9, 0.1, 1.2, 0.5, 1.0) == (4, 8)
+    assert extent.best_part(covered, nothing, 0.0, 0.1, 1.2, 0.7, 1.0) == (0, 8)
+    # Much of an arc in a gap parts it too.
+    arcs = nothing.copy()
+    arcs[3] = 1.5
+    assert extent.best_part(covered, arcs, 0.0, 0.1, 1.2, 0.7, 1.0) == (0, 3)
+    assert extent.bounds_of(np.array([0.05, 0.02, 0.31, 0.38]), 0.0, 0.1, 0, 3) == (0.02, 0.38)
