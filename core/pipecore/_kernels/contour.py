@@ -107,6 +107,15 @@ def solve_by_band(band, right):
 
 
 @njit(cache=True, nogil=True)
+def inverse_by_band(band, inverse):
+    """Write the whole inverse of a matrix with a factor of `factorise_band`."""
+    inverse[:, :] = 0.0
+    for i in range(inverse.shape[0]):
+        inverse[i, i] = 1.0
+        solve_by_band(band, inverse[i])
+
+
+@njit(cache=True, nogil=True)
 def heights(first, basis, harmonics, coefficients, table):
     """Write the contour's height per cell."""
     n_terms = harmonics.shape[1]
@@ -203,3 +212,18 @@ def row_covariances(first, basis, covariance, table):
                             basis[r, a] * basis[r, b] * covariance[first[r] + a, k, first[r] + b, m]
                         )
                 table[r, k, m] = total
+
+
+@njit(cache=True, nogil=True)
+def standard_deviations(harmonics, covariance, table):
+    """Write the standard deviation of a height per cell from the covariance of each row's terms."""
+    n_terms = harmonics.shape[1]
+    for r in range(table.shape[0]):
+        for c in range(table.shape[1]):
+            variance = 0.0
+            for k in range(n_terms):
+                variance += harmonics[c, k] ** 2 * covariance[r, k, k]
+                for m in range(k):
+                    product = harmonics[c, k] * harmonics[c, m]
+                    variance += product * (covariance[r, k, m] + covariance[r, m, k])
+            table[r, c] = math.sqrt(max(variance, 0.0))

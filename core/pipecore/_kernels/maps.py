@@ -7,6 +7,9 @@ from numba import njit
 
 from pipecore._kernels.grouping import group_by_label
 
+FEW = 16
+"""So many values are sorted sooner than their median is selected."""
+
 
 @njit(cache=True, nogil=True)
 def group_medians(group, values, medians, counts):
@@ -21,8 +24,11 @@ def group_medians(group, values, medians, counts):
         own = np.empty(n)
         for i in range(n):
             own[i] = values[members[starts[k] + i]]
-        own.sort()
-        medians[k] = (own[(n - 1) // 2] + own[n // 2]) / 2.0
+        if n > FEW:
+            medians[k] = np.median(own)
+        else:
+            own.sort()
+            medians[k] = (own[(n - 1) // 2] + own[n // 2]) / 2.0
 
 
 @njit(cache=True, nogil=True)

@@ -94,19 +94,19 @@ def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array, grid: Gr
     variance = np.einsum("k,rkl,l->r", side, covariance[::step], side)
     sd = np.sqrt(np.maximum(variance, LEAST_SD**2))
     x = (s - s[0]) / (s[-1] - s[0])
-
-    def chi2(columns: list[Array]) -> tuple[float, Array]:
-        design = np.stack(columns, axis=1) / sd[:, None]
-        solution, *_ = np.linalg.lstsq(design, lateral / sd, rcond=None)
-        return float(np.sum((lateral / sd - design @ solution) ** 2)), solution
-
-    straight, _ = chi2([np.ones_like(x), x])
-    smooth, _ = chi2([np.ones_like(x), x, x**2, x**3, x**4])
-    best, turn, where = np.inf, 0.0, 0.0
-    for knee in x[2:-2]:
-        value, solution = chi2([np.ones_like(x), x, np.maximum(x - knee, 0)])
-        if value < best:
-            best, turn, where = value, abs(float(solution[2])), float(knee)
+    y = lateral / sd
+    waves, _ = np.linalg.qr(np.stack([x**k for k in range(5)], axis=1) / sd[:, None])
+    share = waves.T @ y
+    straight = float(y @ y - share[:2] @ share[:2])
+    smooth = float(y @ y - share @ share)
+    # What a kink at each place adds to the straight line.
+    knees = x[2:-2]
+    kinks = np.maximum(x[:, None] - knees, 0) / sd[:, None]
+    kinks -= waves[:, :2] @ (waves[:, :2].T @ kinks)
+    size, along = np.sum(kinks**2, axis=0), kinks.T @ y
+    k = int(np.argmax(along**2 / size))
+    best = straight - float(along[k] ** 2 / size[k])
+    turn, where = abs(float(along[k] / size[k])), float(knees[k])
     explained = 1.0 - min(best, smooth) / max(straight, 1e-300)
     length = float(s[-1] - s[0])
     if best + KINK_ADVANTAGE > smooth or best > MAX_KINK_SHARE * smooth or turn / length < MIN_KINK:

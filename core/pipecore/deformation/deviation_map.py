@@ -1,5 +1,6 @@
 """The deviation map: signed distances from the contour in cells over chainage and clock."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -72,6 +73,12 @@ class Grid:
         """Centres of the columns, radians."""
         return np.asarray((np.arange(self.n_columns) + 0.5) * self.column_angle)
 
+    def rows_near(self, chainage: float, reach: float) -> slice:
+        """Rows whose middles may lie within reach of a chainage, metres."""
+        first = math.floor((chainage - reach) / self.row_size - 0.5)
+        last = math.ceil((chainage + reach) / self.row_size - 0.5)
+        return slice(min(max(first, 0), self.n_rows), min(max(last + 1, 0), self.n_rows))
+
     def cell_of(self, chainage: Array, clock: Array) -> Cells:
         """Flat index of the cell of each point; those beyond the ends fall into end cells."""
         row = np.clip(np.floor(chainage / self.row_size), 0, self.n_rows - 1)
@@ -127,6 +134,11 @@ class DeviationMap:
     def covered(self) -> Flags:
         """Cells with points, small holes between sparse points closed."""
         return close_holes(self.count > 0)
+
+    @cached_property
+    def near_disputed(self) -> Flags:
+        """Cells that are disputed or next to one that is."""
+        return dilate(self.disputed)
 
 
 def close_holes(cells: Flags) -> Flags:

@@ -153,10 +153,13 @@ class Layer:
 
 def disc(grid: Grid, chainage: float, clock: float, length: float, width: float) -> Flags:
     """Cells within an ellipse of full axes `length` and `width`."""
-    along = (grid.chainages - chainage) / (length / 2)
+    cells = np.zeros(grid.shape, dtype=bool)
+    rows = grid.rows_near(chainage, length / 2)
+    along = (grid.chainages[rows] - chainage) / (length / 2)
     turn = np.mod(grid.clocks - clock + np.pi, 2 * np.pi) - np.pi
     around = turn * grid.radius / (width / 2)
-    return np.asarray(along[:, None] ** 2 + around[None, :] ** 2 < 1.0)
+    cells[rows] = along[:, None] ** 2 + around[None, :] ** 2 < 1.0
+    return cells
 
 
 def _bell(size: float, cell: float) -> Array:

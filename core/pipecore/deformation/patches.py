@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipecore.deformation.bump import TYPICAL_EXTENT, Bump, fit_bump
-from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid, dilate
+from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.matched_filter import Candidate, MatchedFilter, disc
 from pipecore.deformation.reference import Contour, fit_contour
 from pipecore.deformation.surface import Surface
-from pipecore.deformation.unrolled import stretch
+from pipecore.deformation.unrolled import least_stretch, stretch
 from pipecore.geometry import Array
 from pipecore.types import Element
 
@@ -60,6 +60,11 @@ class Patch:
         """Chainage that it covers, metres."""
         return self.bump.length / self.scale
 
+    @property
+    def place(self) -> tuple[float, float, float, float]:
+        """Chainage and clock of its peak, and the chainage and width that it covers."""
+        return self.chainage, self.clock, self.span, self.bump.width
+
     def cells(self, grid: Grid, scale: float = 1.0) -> Flags:
         """Cells within the extent, scaled."""
         return disc(grid, self.chainage, self.clock, scale * self.span, scale * self.bump.width)
@@ -104,7 +109,7 @@ def find_patches(
             break  # The same mask leads to the same contour.
     patches = []
     for seen in found:
-        if _closed_sides(cells, seen.chainage, seen.clock, seen.length, seen.width) >= 3:
+        if _closed_sides(cells, (seen.chainage, seen.clock, seen.length, seen.width)) >= 3:
             patch = _measure(element, surface, cells, contour, seen)
             least = significance * (BULGE_FACTOR if seen.height > 0 else 1.0)
             if patch is not None and abs(patch.z) >= least and patch.is_enclosed:
@@ -123,10 +128,11 @@ def _measure(
     reach = 2.5 * max(seen.length, seen.width)
     scale = float(stretch(element, seen.clock))
     radius = float(element.radius_at(seen.chainage))
-    along = (points.chainage - seen.chainage) * stretch(element, points.clock)
-    near = np.flatnonzero(surface.belongs & (np.abs(along) < reach))
+    near = surface.own_near(seen.chainage, reach / least_stretch(element))
+    along = (points.chainage[near] - seen.chainage) * stretch(element, points.clock[near])
     turn = np.mod(points.clock[near] - seen.clock + np.pi, 2 * np.pi) - np.pi
-    near, turn = near[np.abs(turn) * radius < reach], turn[np.abs(turn) * radius < reach]
+    close = (np.abs(along) < reach) & (np.abs(turn) * radius < reach)
+    near, along, turn = near[close], along[close], turn[close]
     deviation = points.height[near] - grid.interpolate(
         contour.height, points.chainage[near], points.clock[near]
     )
@@ -134,7 +140,7 @@ def _measure(
     column = min(int(seen.clock / grid.column_angle), grid.n_columns - 1)
     contour_sd = float(contour.sd[row, column])
     bump = fit_bump(
-        along[near],
+        along,
         turn * radius,
         deviation,
         cells.noise.ravel()[surface.cell[near]],
@@ -160,42 +166,51 @@ def _measure(
 
 
 def _shares(
-    grid: Grid, chainage: float, clock: float, length: float, width: float
-) -> tuple[Array, Array]:
-    """Distances of all cells from a place as shares of half the extents."""
+    grid: Grid, place: tuple[float, float, float, float], reach: float
+) -> tuple[slice, Array, Array]:
+    """Distances of cells from a place as shares of half the extents, in rows within reach.
+
+    A place is a chainage, a clock, a length and a width; `reach` is such a share too. Returns
+    the rows, and the distances along and around of their cells.
+    """
+    chainage, clock, length, width = place
+    rows = grid.rows_near(chainage, reach * length / 2)
     turn = np.mod(grid.clocks - clock + np.pi, 2 * np.pi) - np.pi
-    u = (grid.chainages - chainage) / (length / 2)
+    u = (grid.chainages[rows] - chainage) / (length / 2)
     v = turn * grid.radius / (width / 2)
     along, around = np.broadcast_arrays(u[:, None], v[None, :])
-    return along, around
+    return rows, along, around
 
 
-def _closed_sides(
-    cells: DeviationMap, chainage: float, clock: float, length: float, width: float
-) -> int:
+def _sides(u: Array, v: Array) -> tuple[Flags, ...]:
+    """Cells ahead, behind, to the right and to the left of a place."""
+    return u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)
+
+
+def _closed_sides(cells: DeviationMap, place: tuple[float, float, float, float]) -> int:
     """On how many of its four sides a bump is seen to come back to the contour."""
     grid = cells.grid
-    u, v = _shares(grid, chainage, clock, length, width)
+    rows, u, v = _shares(grid, place, 1.2)
     distance = np.hypot(u, v)
-    covered = cells.covered & (distance > 0.4) & (distance < 1.2)
+    covered = cells.covered[rows] & (distance > 0.4) & (distance < 1.2)
     # Beyond the ends there are no cells: count what should be there.
+    _, _, length, width = place
     quarter = np.pi / 4 * (1.2**2 - 0.4**2) * (length * width / 4)
     expected = quarter / (grid.row_size * grid.column_size)
-    sides = [u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)]
-    return sum(int(np.count_nonzero(covered & side) > 0.5 * expected) for side in sides)
+    return sum(int(np.count_nonzero(covered & side) > 0.5 * expected) for side in _sides(u, v))
 
 
 def _returns(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
     """On how many of its four sides the surface is back at the contour beyond a bump."""
-    u, v = _shares(cells.grid, patch.chainage, patch.clock, patch.span, patch.bump.width)
+    rows, u, v = _shares(cells.grid, patch.place, 1.5)
     distance = np.hypot(u, v)
-    ring = (distance > 1.0) & (distance < 1.5) & (cells.count > 0)
+    ring = (distance > 1.0) & (distance < 1.5) & (cells.count[rows] > 0)
     n_back = 0
-    for side in (u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)):
+    for side in _sides(u, v):
         there = ring & side
-        weight = cells.count[there] / cells.noise[there] ** 2
+        weight = cells.count[rows][there] / cells.noise[rows][there] ** 2
         if weight.sum() > 0:
-            mean = float(np.average(deviation[there], weights=weight))
+            mean = float(np.average(deviation[rows][there], weights=weight))
             least = 2.5 / np.sqrt(weight.sum())
             n_back += abs(mean) < max(RETURN * abs(patch.bump.height), least)
     return n_back
@@ -210,14 +225,14 @@ def _seen_sides(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
     bump = patch.bump
     if not 0 < patch.chainage < cells.grid.length or bump.n_points < MIN_POINTS:
         return 0
-    place = (patch.chainage, patch.clock, patch.span, bump.width)
-    distance = np.hypot(*_shares(cells.grid, *place))
+    rows, u, v = _shares(cells.grid, patch.place, 1.1)
+    distance = np.hypot(u, v)
     centre, inside = distance < 0.5, distance < 1.1
-    if np.count_nonzero(cells.covered & centre) <= 0.6 * np.count_nonzero(centre):
+    if np.count_nonzero(cells.covered[rows] & centre) <= 0.6 * np.count_nonzero(centre):
         return 0
-    n_closed = min(_closed_sides(cells, *place), _returns(cells, deviation, patch))
+    n_closed = min(_closed_sides(cells, patch.place), _returns(cells, deviation, patch))
     if bump.height > 0:
-        disputed = np.count_nonzero(dilate(cells.disputed) & inside)
+        disputed = np.count_nonzero(cells.near_disputed[rows] & inside)
         is_own = disputed < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
         return n_closed if is_own else 0
     return n_closed

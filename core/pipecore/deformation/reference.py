@@ -14,8 +14,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
-from scipy.linalg import cho_solve_banded
 
 from pipecore._kernels import contour as kernels
 from pipecore.deformation.deviation_map import Flags, Grid
@@ -93,11 +91,9 @@ class Contour:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of the coefficients, shape (splines, terms, splines, terms)."""
-        unit = np.eye(len(self.factor))
-        inverse = cho_solve_banded(
-            (self.factor.T, True), unit, overwrite_b=True, check_finite=False
-        )
-        return np.ascontiguousarray(inverse).reshape(*self.coefficients.shape * 2)
+        inverse = np.empty((len(self.factor), len(self.factor)))
+        kernels.inverse_by_band(self.factor, inverse)
+        return inverse.reshape(*self.coefficients.shape * 2)
 
     @cached_property
     def terms(self) -> Array:
@@ -124,10 +120,10 @@ class Contour:
     @cached_property
     def sd(self) -> Array:
         """Standard deviation of `height` per cell, metres."""
+        result = np.empty(self.grid.shape)
         phi = harmonics(self.grid.clocks, self.n_terms)
-        pairs = (phi[:, :, None] * phi[:, None, :]).reshape(len(phi), -1)
-        variance = self.term_covariance.reshape(len(self.basis.first), -1) @ pairs.T
-        return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+        kernels.standard_deviations(phi, self.term_covariance, result)
+        return result
 
 
 def harmonics(clock: Array, n_terms: int) -> Array:
@@ -146,10 +142,10 @@ def spline_basis(grid: Grid, knot_diameters: float) -> Basis:
     wanted = grid.length / (2 * grid.radius * knot_diameters)
     intervals = int(np.clip(np.ceil(wanted), 1, MAX_INTERVALS))
     step = grid.length / intervals
-    knots = np.arange(-3, intervals + 4) * step
-    table = BSpline.design_matrix(grid.chainages, knots, 3)
-    first = table.indices.reshape(-1, 4)[:, 0].astype(np.int64)
-    return Basis(first, table.data.reshape(-1, 4), table.shape[1])
+    first = (grid.chainages / step).astype(np.int64)
+    t = grid.chainages / step - first
+    values = [(1 - t) ** 3, 3 * t**3 - 6 * t**2 + 4, -3 * t**3 + 3 * t**2 + 3 * t + 1, t**3]
+    return Basis(first, np.stack(values, axis=1) / 6, intervals + 3)
 
 
 def fit_contour(

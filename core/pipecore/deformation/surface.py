@@ -1,10 +1,13 @@
 """Which of the points around an element lie on its own surface."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipecore._kernels.grouping import group_from
 from pipecore.deformation.deviation_map import (
     Flags,
     Grid,
@@ -51,6 +54,19 @@ class Surface:
     cell: np.ndarray
     noise: Array
     foreign: Flags
+
+    @cached_property
+    def _by_row(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The points that belong in the order of their rows, and where those of each begin."""
+        row = np.where(self.belongs, self.cell // self.grid.n_columns, -1)
+        members, starts = group_from(row, 0, self.grid.n_rows)
+        return members, starts
+
+    def own_near(self, chainage: float, reach: float) -> NDArray[np.intp]:
+        """Points that belong, in order, in rows that may hold some within reach of a chainage."""
+        members, starts = self._by_row
+        rows = self.grid.rows_near(chainage, reach + self.grid.row_size)
+        return np.sort(members[starts[rows.start] : starts[rows.stop]])
 
 
 def own_surface(element: Element, points: Unrolled) -> Surface | None:

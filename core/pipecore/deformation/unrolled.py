@@ -80,3 +80,10 @@ def stretch(element: Element, clock: Array | float) -> Array:
     up_part, right_part = up @ axis.towards_start, right @ axis.towards_start
     outward = np.cos(theta) * up_part + np.sin(theta) * right_part
     return np.asarray(1.0 + element.radius * outward / axis.bend_radius)
+
+
+def least_stretch(element: Element) -> float:
+    """Least value of `stretch` all round; not quite zero in the tightest bend."""
+    if not isinstance(element.axis, ArcAxis):
+        return 1.0
+    return float(max(1.0 - element.radius / element.axis.bend_radius, 0.05))

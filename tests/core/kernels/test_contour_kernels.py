@@ -70,6 +70,9 @@ def test_that_a_band_is_factorised_and_solved(rng):
         assert_allclose(band[: 9 - i, i], np.diagonal(np.linalg.cholesky(matrix), -i))
     kernels.solve_by_band(band, right)
     assert_allclose(right, expected)
+    inverse = np.empty((9, 9))
+    kernels.inverse_by_band(band, inverse)
+    assert_allclose(inverse, np.linalg.inv(matrix), atol=1e-12)
 
 
 def test_that_heights_and_residuals_are_those_of_the_coefficients(parts, rng):
@@ -138,3 +141,12 @@ def test_that_covariances_of_rows_are_those_of_their_splines(parts, rng):
     found = np.empty((ROWS, n_terms, n_terms))
     kernels.row_covariances(first, values, covariance, found)
     assert_allclose(found, np.einsum("ra,akbm,rb->rkm", table, covariance, table), atol=1e-9)
+
+
+def test_that_deviations_of_heights_are_those_of_their_terms(parts, rng):
+    phi = parts[1][2]
+    root = rng.normal(size=(ROWS, phi.shape[1], phi.shape[1]))
+    covariance = root @ root.transpose(0, 2, 1)
+    found = np.empty((ROWS, COLUMNS))
+    kernels.standard_deviations(phi, covariance, found)
+    assert_allclose(found**2, np.einsum("ck,rkm,cm->rc", phi, covariance, phi))
