@@ -75,7 +75,7 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
     with _timed(seconds, "stacks"):
         stacks = choose_stacks(surface, settings.stacks, progress, points.local_axes)
         overlay, found = Overlay(len(surface.xyz), points.allocate), []
-        uneven = points.choose_cuts(surface, stacks, overlay.add_planes, settings, progress)
+        uneven = points.leave_out_planes(surface, overlay.add_planes, settings, progress)
     for stack, span in _shares(stacks):
         # Stack by stack: the curves of all together need more memory than the cloud.
         with _timed(seconds, "profiles"):

@@ -4,7 +4,7 @@ In memory they are taken together. `pipecore.tiling` has a workspace of files fo
 are larger, with the same results.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -19,10 +19,7 @@ from pipecore.profiles import Curves, segment_profiles
 from pipecore.progress import Progress, Renamed
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.stacks.directions import local_axes
-from pipecore.stacks.places import stacks_of_cells
-from pipecore.surface import Order, Surface, sample_surface
-from pipecore.surface.cells import Cells, cells_of_points
-from pipecore.surface.planes import find_planes
+from pipecore.surface import Order, Surface, planes_of_points, sample_surface
 from pipecore.types import PointCloud, Stack
 
 Array = NDArray[np.float64]
@@ -44,13 +41,10 @@ class Uneven:
         In memory these points only; else all of them, and files tell which are cut.
     rows : ndarray of int32
         Their places among all of the surface; empty where files tell.
-    cut_by : ndarray of int64
-        Bits that tell which stacks cut each; empty where files tell.
     """
 
     surface: Surface
     rows: NDArray[np.int32]
-    cut_by: NDArray[np.int64]
 
 
 class Workspace(Protocol):
@@ -74,15 +68,10 @@ class Workspace(Protocol):
         """Directions of the local axis at sampled curved places of the surface."""
         ...
 
-    def choose_cuts(
-        self,
-        surface: Surface,
-        stacks: Sequence[Stack],
-        join: JoinPlanes,
-        settings: Settings,
-        progress: Progress,
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
     ) -> Uneven:
-        """Find the planes of the surface, tell them to `join`, return what each stack cuts."""
+        """Find the planes of the surface, tell them to `join`, return what is to be cut."""
         ...
 
     def cut(
@@ -112,21 +101,17 @@ class InMemory:
         """See `Workspace`."""
         return local_axes(surface, progress)
 
-    def choose_cuts(
-        self,
-        surface: Surface,
-        stacks: Sequence[Stack],
-        join: JoinPlanes,
-        settings: Settings,
-        progress: Progress,
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
     ) -> Uneven:
         """See `Workspace`."""
-        cells, ids = cells_of_points(surface.xyz, surface.normals, surface.voxel, progress)
-        plane, cut_by = cuts_of_cells(cells, surface.voxel, stacks, settings)
-        join(0, plane[ids])
-        of_points = cut_by[ids]
-        rows = np.flatnonzero(of_points).astype(np.int32)
-        return Uneven(surface.part(rows), rows, of_points[rows])
+        max_radius = settings.elements.max_radius_mm / 1e3
+        plane, is_cut = planes_of_points(
+            surface.xyz, surface.normals, surface.voxel, max_radius, progress
+        )
+        join(0, plane)
+        rows = np.flatnonzero(is_cut).astype(np.int32)
+        return Uneven(surface.part(rows), rows)
 
     def cut(
         self,
@@ -137,23 +122,12 @@ class InMemory:
         span: tuple[float, float],
     ) -> Iterator[Cut]:
         """See `Workspace`."""
-        curves, ellipses = cut_and_fit(
-            uneven.surface, uneven.cut_by, stack, settings, progress, span
-        )
+        curves, ellipses = cut_and_fit(uneven.surface, stack, settings, progress, span)
         yield uneven.rows[curves.points], curves.starts, ellipses
-
-
-def cuts_of_cells(
-    cells: Cells, voxel: float, stacks: Sequence[Stack], settings: Settings
-) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Plane of each cell, and bits that tell which stacks cut it: none well inside of planes."""
-    plane, is_cut = find_planes(cells, voxel, settings.elements.max_radius_mm / 1e3)
-    return plane, np.where(is_cut, stacks_of_cells(cells, stacks), 0)
 
 
 def cut_and_fit(
     surface: Surface,
-    cut_by: NDArray[np.int64],
     stack: Stack,
     settings: Settings,
     progress: Progress,
@@ -164,7 +138,7 @@ def cut_and_fit(
     middle = begin + 0.85 * (end - begin)
     max_radius = settings.elements.max_radius_mm / 1e3
     curves = segment_profiles(
-        surface, stack, settings.profiles, max_radius, progress, (begin, middle), cut_by
+        surface, stack, settings.profiles, max_radius, progress, (begin, middle)
     )
     told = Renamed(progress, "profiles")
     ellipses = fit_ellipses(

@@ -15,8 +15,6 @@ from pipecore._kernels.profiles import find_root, unite
 
 SCALE = 2.0**20
 N_SUMS = 10
-N_NORMAL_SUMS = 7
-"""The first ones, of normals."""
 
 MIN_CELLS, MIN_ACROSS = 12, 1.0
 """Patches of fewer cells are no planes, nor are those of less mean square width: four cells."""
@@ -49,15 +47,21 @@ def add_to_cells(xyz, normals, ids, edge, sums):
 
 
 @njit(cache=True, nogil=True)
-def sum_around(keys, sums, n_y, n_z, around):
-    """Write the sums of normals over each cell and those next to it.
+def describe_cells(
+    keys, cells, sums, n_y, n_z, min_points, max_spread, max_curved, is_flat, normals, means
+):
+    """Write whether each cell and those around it are flat, their normal, and the cell's mean.
 
-    `keys` ascend and number the cells row by row, `n_z` to a row.
+    `keys` ascend and number the cells row by row, `n_z` to a row. A place is flat if the
+    second eigenvalue of Σnnᵀ is at most `max_spread` of the sum of all, and at most
+    `max_curved` above the least: noise turns normals alike in both directions, a curved
+    surface in one. Means are in cells' edges; nan where no point has a normal.
     """
     n = keys.shape[0]
     begins = np.zeros(9, np.int64)
+    around = np.empty(7, np.int64)
     for c in range(n):
-        around[c, :] = 0
+        around[:] = 0
         for row in range(9):
             low = keys[c] + ((row // 3 - 1) * n_y + row % 3 - 1) * n_z - 1
             j = begins[row]
@@ -65,91 +69,24 @@ def sum_around(keys, sums, n_y, n_z, around):
                 j += 1
             begins[row] = j
             while j < n and keys[j] <= low + 2:
-                for k in range(N_NORMAL_SUMS):
-                    around[c, k] += sums[j, k]
+                for k in range(7):
+                    around[k] += sums[j, k]
                 j += 1
-
-
-@njit(cache=True, nogil=True)
-def mean_products(sums):
-    """Means of n nᵀ (xx, xy, xz, yy, yz, zz) of the sums of a place."""
-    share = 1.0 / (sums[0] * SCALE)
-    return (
-        sums[1] * share, sums[2] * share, sums[3] * share,
-        sums[4] * share, sums[5] * share, sums[6] * share,
-    )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
-def describe_cells(
-    cells, sums, around, min_points, max_spread, max_curved, is_flat, normals, means
-):
-    """Write whether each cell and those around it are flat, their normal, and the cell's mean.
-
-    A place is flat if the second eigenvalue of Σnnᵀ is at most `max_spread` of the sum of
-    all, and at most `max_curved` above the least: noise turns normals alike in both
-    directions, a curved surface in one. Means are in cells' edges; nan where no point has a
-    normal.
-    """
-    for c in range(cells.shape[0]):
         own = sums[c, 0]
         for k in range(3):
             means[c, k] = cells[c, k] + sums[c, 7 + k] / (own * SCALE) if own > 0 else math.nan
         is_flat[c] = False
         normals[c, 0] = normals[c, 1] = normals[c, 2] = math.nan
-        if own == 0 or around[c, 0] < min_points:
+        if own == 0 or around[0] < min_points:
             continue
-        xx, xy, xz, yy, yz, zz = mean_products(around[c])
+        share = 1.0 / (around[0] * SCALE)
+        xx, xy, xz = around[1] * share, around[2] * share, around[3] * share
+        yy, yz, zz = around[4] * share, around[5] * share, around[6] * share
         least, middle, largest = eigenvalues(xx, xy, xz, yy, yz, zz)
         if middle <= max_spread and middle - least <= max_curved:
             is_flat[c] = True
             x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, largest)
             normals[c, 0], normals[c, 1], normals[c, 2] = x, y, z
-
-
-FULL, FLAT, CURVED = 0, 1, 2
-"""What the normals of a place span: space, a line, a plane."""
-
-
-@njit(cache=True, nogil=True)
-def fit_axes(around, min_points, curved, max_ratio, nature, axes):
-    """Write what the normals around each cell span, and the axis that is across to all.
-
-    They span a line where the second eigenvalue of Σnnᵀ is at most `curved` of the sum,
-    and a plane where it is larger and the least at most `max_ratio` of it. Where there are
-    fewer than `min_points`, as if they spanned space; there and on lines the axis is nan.
-    """
-    for c in range(around.shape[0]):
-        nature[c] = FULL
-        axes[c, 0] = axes[c, 1] = axes[c, 2] = math.nan
-        if around[c, 0] < min_points:
-            continue
-        xx, xy, xz, yy, yz, zz = mean_products(around[c])
-        least, middle, _ = eigenvalues(xx, xy, xz, yy, yz, zz)
-        if middle <= curved:
-            nature[c] = FLAT
-        elif least <= max_ratio * middle:
-            nature[c] = CURVED
-            x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
-            axes[c, 0], axes[c, 1], axes[c, 2] = x, y, z
-
-
-@njit(cache=True, nogil=True)
-def unite_bits(keys, n_y, n_z, bits, united):
-    """Write the bits of each cell and of those next to it."""
-    n = keys.shape[0]
-    begins = np.zeros(9, np.int64)
-    for c in range(n):
-        united[c] = 0
-        for row in range(9):
-            low = keys[c] + ((row // 3 - 1) * n_y + row % 3 - 1) * n_z - 1
-            j = begins[row]
-            while j < n and keys[j] < low:
-                j += 1
-            begins[row] = j
-            while j < n and keys[j] <= low + 2:
-                united[c] |= bits[j]
-                j += 1
 
 
 @njit(cache=True, nogil=True)

@@ -51,20 +51,15 @@ def slope_to(normals, i, direction):
 
 @njit(cache=True, nogil=True)
 def find_profiles(
-    xyz, normals, spacing, cut_by, bit, start, stop, direction, width, offset, max_slope,
-    min_spacing, profile,
-):  # fmt: skip
+    xyz, normals, spacing, start, stop, direction, width, offset, max_slope, min_spacing, profile
+):
     """Write the profile of each of the points start … stop; return the lowest and the highest.
 
-    `NOT_CUT` is written for points without the stack's `bit` in `cut_by`, whose surface the
-    stack cuts too obliquely (|n·d| ≥ `max_slope`), or that are closer to their neighbours than
-    `min_spacing`.
+    `NOT_CUT` is written for points whose surface the stack cuts too obliquely
+    (|n·d| ≥ `max_slope`), or that are closer to their neighbours than `min_spacing`.
     """
     low, high = np.int64(2**31), np.int64(-(2**31))
     for i in range(start, stop):
-        if not (cut_by[i] >> bit) & 1:
-            profile[i] = NOT_CUT
-            continue
         nd = slope_to(normals, i, direction)
         # Also where the normal or the spacing is nan.
         if not (abs(nd) < max_slope and spacing[i] >= min_spacing):

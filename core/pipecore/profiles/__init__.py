@@ -13,7 +13,6 @@ from pipecore.geometry import unit
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ProfileMethod, ProfileSettings
-from pipecore.stacks.places import ALL, stack_bit
 from pipecore.surface import Surface
 from pipecore.types import Stack
 
@@ -98,7 +97,6 @@ def segment_profiles(
     max_radius: float,
     progress: Progress = NoProgress(),
     span: tuple[float, float] = (0.0, 1.0),
-    cut_by: NDArray[np.int64] | None = None,
 ) -> Curves:
     """Cut `stack` out of the surface and join the points of each profile to curves.
 
@@ -117,16 +115,11 @@ def segment_profiles(
     progress : Progress
     span : (float, float)
         Which part of the stage "profiles" this is.
-    cut_by : ndarray of int64, shape (n,), optional
-        Bits that tell which stacks cut each point of the surface (`stacks.places.stack_bit`);
-        without them all are cut.
     """
     begin, end = span
     progress.update("profiles", begin)
     middle = begin + 0.1 * (end - begin)
-    if cut_by is None:
-        cut_by = np.full(len(surface.xyz), ALL)
-    cutter = _Cutter(surface, cut_by, stack, settings, max_radius, progress, (begin, middle))
+    cutter = _Cutter(surface, stack, settings, max_radius, progress, (begin, middle))
     bounds = cutter.bounds()
     parts: list[Curves | None] = [None] * (len(bounds) - 1)
 
@@ -144,7 +137,6 @@ class _Cutter:
     def __init__(
         self,
         surface: Surface,
-        cut_by: NDArray[np.int64],
         stack: Stack,
         settings: ProfileSettings,
         max_radius: float,
@@ -163,9 +155,8 @@ class _Cutter:
 
         def find(start: int, stop: int) -> None:
             limits[start // POINTS_AT_A_TIME] = kernels.find_profiles(
-                surface.xyz, surface.normals, surface.spacing, cut_by, stack_bit(stack),
-                start, stop, self.frame[2], stack.width, stack.offset, MAX_SLOPE,
-                stack.min_spacing, profile,
+                surface.xyz, surface.normals, surface.spacing, start, stop,
+                self.frame[2], stack.width, stack.offset, MAX_SLOPE, stack.min_spacing, profile,
             )  # fmt: skip
 
         for_chunks(find, n, POINTS_AT_A_TIME, "profiles", progress, span)

@@ -10,6 +10,7 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import cells_of
+from pipecore.surface.planes import planes_of_points
 from pipecore.surface.sorting import CellGrid, Order, index_type, take_points
 from pipecore.surface.spacing import median_spacing
 from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
@@ -27,6 +28,7 @@ __all__ = [
     "fit_planes",
     "index_type",
     "median_spacing",
+    "planes_of_points",
     "sample_surface",
     "thin",
 ]

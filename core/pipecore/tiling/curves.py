@@ -5,7 +5,7 @@ those of the whole cloud. What joins batches and stacks are the thinned points t
 curves share.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -19,14 +19,13 @@ from pipecore.profiles import MAX_SLOPE
 from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
-from pipecore.stacks.places import stack_bit
 from pipecore.surface import NOTHING_BEHIND, Surface
-from pipecore.surface.cells import Cells, CellSums, sum_cells
+from pipecore.surface.planes import CellSums, find_planes, sum_cells
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.store import StopWhenUnwanted, Store
 from pipecore.tiling.thinning import Rows, TiledSurface
 from pipecore.types import Stack
-from pipecore.workspace import Cut, JoinPlanes, cut_and_fit, cuts_of_cells
+from pipecore.workspace import Cut, JoinPlanes, cut_and_fit
 
 Array = NDArray[np.float64]
 
@@ -34,8 +33,7 @@ BYTES_PER_POINT = 420
 """What cutting a thinned point into a profile and fitting its curve takes at the most."""
 SORTING = 0.3
 """Share of the time that sorting points by profile takes."""
-SURFACE_ARRAYS = "surface", "normals", "spacing"
-CUT_ARRAYS = *SURFACE_ARRAYS, "stacks"
+CUT_ARRAYS = "surface", "normals", "spacing"
 """What the cutting of profiles looks at."""
 
 
@@ -61,30 +59,22 @@ def local_axes_in_slabs(engine: Engine, tiled: TiledSurface, progress: Progress)
     return np.concatenate(engine.run(axes_of_slab, tiles, "directions", progress))
 
 
-def choose_cuts(
-    engine: Engine,
-    tiled: TiledSurface,
-    stacks: Sequence[Stack],
-    join: JoinPlanes,
-    settings: Settings,
-    progress: Progress,
+def leave_out_planes(
+    engine: Engine, tiled: TiledSurface, join: JoinPlanes, max_radius: float, progress: Progress
 ) -> None:
-    """Find the planes and tell them; write for each slab which of its points are cut by what."""
+    """Find the planes and tell them; write for each slab which of its points are cut."""
     store, voxel = engine.store, tiled.surface.voxel
     tiles = [(k, slab.surface, voxel) for k, slab in enumerate(tiled.slabs)]
     parts = engine.run(sum_slab_cells, tiles, "directions", progress, (0.8, 1.0))
-    cells, places = Cells.joined(parts)
-    plane, cut_by = cuts_of_cells(cells, voxel, stacks, settings)
-    for k, (slab, place) in enumerate(zip(tiled.slabs, places, strict=True)):
+    known = find_planes(parts, voxel, max_radius)
+    for k, (slab, cells) in enumerate(zip(tiled.slabs, known, strict=True)):
         progress.update("directions", 1.0)
-        ids = place[store.open(f"cells-{k}")]
-        join(slab.surface[0], plane[ids])
-        own = cut_by[ids]
-        rows = slab.surface[0] + np.flatnonzero(own)
+        ids = store.open(f"cells-{k}")
+        join(slab.surface[0], cells.plane[ids])
+        rows = slab.surface[0] + np.flatnonzero(cells.is_cut[ids])
         store.save(f"cut-{k}", rows.astype(np.int32))
         # Every stack looks at these points, so that they are laid side by side.
-        store.save(f"cut-stacks-{k}", own[own != 0])
-        for name in SURFACE_ARRAYS:
+        for name in CUT_ARRAYS:
             store.save(f"cut-{name}-{k}", store.open(name)[rows])
         store.remove(f"cells-{k}")
 
@@ -171,11 +161,11 @@ def sort_slab(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Write a slab's points that join a stack by profile; return profiles and their counts."""
     StopWhenUnwanted(store).update("profiles", 0.0)
-    xyz, normals, spacing, cut_by = (store.open(f"cut-{name}-{number}") for name in CUT_ARRAYS)
+    xyz, normals, spacing = (store.open(f"cut-{name}-{number}") for name in CUT_ARRAYS)
     profile = np.empty(len(xyz), np.int32)
     kernels.find_profiles(
-        xyz, normals, spacing, cut_by, stack_bit(stack), 0, len(profile), stack.direction,
-        stack.width, stack.offset, MAX_SLOPE, stack.min_spacing, profile,
+        xyz, normals, spacing, 0, len(profile), stack.direction, stack.width, stack.offset,
+        MAX_SLOPE, stack.min_spacing, profile,
     )  # fmt: skip
     joins = np.flatnonzero(profile != kernels.NOT_CUT)
     keys = profile[joins].astype(np.int64)
@@ -201,9 +191,9 @@ def ellipses_of_batch(
         return np.concatenate([store.open(f"{name}-{k}")[own] for k, own in enumerate(chosen)])
 
     index = of_all("cut")
-    xyz, normals, spacing, cut_by = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
+    xyz, normals, spacing = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
     surface = Surface(xyz, normals, spacing, NOTHING_BEHIND, facts.voxel, facts.noise)
-    curves, ellipses = cut_and_fit(surface, cut_by, stack, settings, StopWhenUnwanted(store))
+    curves, ellipses = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
     store.save(f"points-{number}", index[curves.points])
     store.save(f"curves-{number}", curves.starts)
     # Without the profile's frame as a view, which does not travel.

@@ -1,6 +1,6 @@
 """A cloud larger than memory: its points in files, looked at tile by tile."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from pipecore.allocation import Allocate
 from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.surface import Surface
-from pipecore.tiling.curves import choose_cuts, cut_in_batches, local_axes_in_slabs
+from pipecore.tiling.curves import cut_in_batches, leave_out_planes, local_axes_in_slabs
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
 from pipecore.types import PointCloud, Stack
@@ -48,17 +48,13 @@ class InTiles:
         """See `Workspace`."""
         return local_axes_in_slabs(self._engine, self._known(), progress)
 
-    def choose_cuts(
-        self,
-        surface: Surface,
-        stacks: Sequence[Stack],
-        join: JoinPlanes,
-        settings: Settings,
-        progress: Progress,
+    def leave_out_planes(
+        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
     ) -> Uneven:
         """See `Workspace`."""
-        choose_cuts(self._engine, self._known(), stacks, join, settings, progress)
-        return Uneven(surface, np.empty(0, np.int32), np.empty(0, np.int64))
+        max_radius = settings.elements.max_radius_mm / 1e3
+        leave_out_planes(self._engine, self._known(), join, max_radius, progress)
+        return Uneven(surface, np.empty(0, np.int32))
 
     def cut(
         self,

@@ -5,8 +5,13 @@ import pytest
 from numpy.testing import assert_array_equal
 
 from pipecore.geometry import LineAxis
-from pipecore.surface.cells import CELL, Cells, cells_of_points, sum_cells
-from pipecore.surface.planes import NO_PLANE, find_planes
+from pipecore.surface.planes import (
+    CELL,
+    NO_PLANE,
+    find_planes,
+    planes_of_points,
+    sum_cells,
+)
 from tests.core.shapes import known, part_of, plane, random_rotation, tube, unit_rows
 
 MAX_RADIUS = 5.0
@@ -32,15 +37,9 @@ def pipe(rng, axis, radius, **how):
     return tilted(rng, tube(rng, axis, radius, spacing=SPACING, noise=0.002, **how))
 
 
-def planes_of_points(xyz, normals, max_radius=MAX_RADIUS):
-    cells, ids = cells_of_points(xyz, normals, SPACING)
-    plane, is_cut = find_planes(cells, SPACING, max_radius)
-    return plane[ids], is_cut[ids]
-
-
 def found(*parts, max_radius=MAX_RADIUS):
     surface = known(*parts, spacing=SPACING)
-    return planes_of_points(surface.xyz, surface.normals, max_radius)
+    return planes_of_points(surface.xyz, surface.normals, SPACING, max_radius)
 
 
 def test_that_a_floor_is_one_plane_and_not_cut(rng):
@@ -110,28 +109,27 @@ def test_that_a_narrow_strip_may_be_of_a_vessel(rng):
 
 def test_that_points_without_normals_are_of_no_plane(rng):
     xyz, normals = floor(rng)
-    plane_of, is_cut = planes_of_points(xyz, np.full_like(normals, np.nan))
+    plane_of, is_cut = planes_of_points(xyz, np.full_like(normals, np.nan), SPACING, MAX_RADIUS)
     assert is_cut.all()
     assert (plane_of == NO_PLANE).all()
     nothing = np.empty((0, 3))
-    assert len(planes_of_points(nothing, nothing)[0]) == 0
+    assert len(planes_of_points(nothing, nothing, SPACING, MAX_RADIUS)[0]) == 0
 
 
 def test_that_planes_do_not_depend_on_order_or_parts(rng):
     axis = LineAxis(np.array([1.0, 2.0, 0.05]), np.array([1.0, 0, 0]), 2.0)
     parts = (turned(p, random_rotation(rng)) for p in (floor(rng), pipe(rng, axis, 0.05)))
     xyz, normals = (np.concatenate(p) for p in zip(*parts, strict=True))
-    plane_of, is_cut = planes_of_points(xyz, normals)
+    plane_of, is_cut = planes_of_points(xyz, normals, SPACING, MAX_RADIUS)
     assert 0 < is_cut.mean() < 1
     order = rng.permutation(len(xyz))
-    again = planes_of_points(xyz[order], normals[order])
+    again = planes_of_points(xyz[order], normals[order], SPACING, MAX_RADIUS)
     assert_array_equal(again[0], plane_of[order])
     assert_array_equal(again[1], is_cut[order])
     # As tiles do, divided anyhow.
     pieces = np.split(order, np.sort(rng.choice(len(xyz), 4)))
     summed = [sum_cells(xyz[rows], normals[rows], SPACING) for rows in pieces]
-    cells, places = Cells.joined([sums for sums, _ in summed])
-    told_plane, told_cut = find_planes(cells, SPACING, MAX_RADIUS)
-    for rows, (_, ids), place in zip(pieces, summed, places, strict=True):
-        assert_array_equal(told_plane[place[ids]], plane_of[rows])
-        assert_array_equal(told_cut[place[ids]], is_cut[rows])
+    told = find_planes([sums for sums, _ in summed], SPACING, MAX_RADIUS)
+    for rows, (_, ids), cells in zip(pieces, summed, told, strict=True):
+        assert_array_equal(cells.plane[ids], plane_of[rows])
+        assert_array_equal(cells.is_cut[ids], is_cut[rows])
