@@ -49,6 +49,8 @@ class Canvas(QVTKRenderWindowInteractor):
     hovered = Signal(QPointF)
     left = Signal()
     before_frame = Signal()
+    moved = Signal()
+    """The camera is, or will be, elsewhere."""
     settled = Signal()
     """The camera has rested for a while, and all there is time for is drawn."""
     drawn = Signal(float)
@@ -212,6 +214,7 @@ class Canvas(QVTKRenderWindowInteractor):
     def _set_moving(self) -> None:
         self.is_moving, self.seconds_to_draw = True, 0.0
         self._settling.stop()
+        self.moved.emit()
 
     def fly_to(self, pose: Pose, *, fly: bool = True) -> None:
         """Take the camera there in `FLIGHT_MS`, or at once."""

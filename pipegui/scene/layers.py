@@ -53,6 +53,8 @@ class Layers(QObject):
         self._details.found.connect(self._show_close_up)
         self._subset.found.connect(self._show_subset)
         canvas.settled.connect(self._look_closer)
+        # Not with the next picture: where that is late, the camera may be at rest again.
+        canvas.moved.connect(self._end_close_up)
         self._search: Callable[[], NDArray[np.int32] | None] | None = None
         canvas.drawn.connect(self._begin_search)
         for layer in (self.whole, self.close_up, self.preview):
@@ -118,8 +120,6 @@ class Layers(QObject):
         canvas, view = self._canvas, self._state.view
         if not canvas.is_software:
             self.whole.most = self.close_up.most = NO_LIMIT
-        if canvas.is_moving:
-            self._end_close_up()
         layers = (self.preview, self.close_up, self.whole)
         self.shown = next(layer for layer in layers if len(layer) or layer is self.whole)
         for layer in layers:

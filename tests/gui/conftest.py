@@ -18,12 +18,14 @@ from pipegui.jobs import Jobs
 from pipegui.main_window import MainWindow
 from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_parts
-from tests.gui.patience import PatientBot
+from tests.gui.patience import PATIENCE, PatientBot
 
 
 @pytest.fixture(scope="session")
 def qapp(qapp: QApplication) -> QApplication:
     QStandardPaths.setTestModeEnabled(True)
+    # The letters of a word typed into a choice belong together, however slowly they come.
+    qapp.setKeyboardInputInterval(PATIENCE)
     theme.apply_theme(qapp)
     return qapp
 
@@ -56,7 +58,15 @@ def _render_windows() -> set[int]:
     return {id(o) for o in gc.get_objects() if isinstance(o, core.vtkRenderWindow)}
 
 
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Let the collector look at what tests make only: after each it looks several times."""
+    gc.collect()
+    gc.freeze()
+
+
 HAS_FAILED = pytest.StashKey[bool]()
+ENDING_S = 20.0
+"""What a thread is given to end after its test."""
 
 
 @pytest.hookimpl(wrapper=True)
@@ -100,6 +110,8 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
     yield
     request.node.funcargs.clear()  # pytest's own references to what the fixtures made
     _flush()
+    for thread in set(threading.enumerate()) - threads:
+        thread.join(ENDING_S)
     left = [window for address, window in _top_level(app).items() if address not in windows]
     running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
     rendering = _render_windows() - render_windows

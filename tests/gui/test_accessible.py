@@ -186,6 +186,7 @@ def test_that_tab_never_leads_where_nothing_is_seen(detected, qtbot):
     detected.panels.tree.view.setFocus()
     passed = set()
     for _ in range(60):
+        qtbot.waitUntil(lambda: QApplication.focusWidget() is not None)
         focused = QApplication.focusWidget()
         qtbot.waitUntil(lambda w=focused: not w.visibleRegion().isEmpty() or w.height() == 0)
         passed |= {name for name, d in detected.panels.docks.items() if d.isAncestorOf(focused)}

@@ -14,7 +14,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
 from pipegui.parts import make_parts
+from pipegui.scene.canvas import SETTLED_SECONDS
 from tests.factories import make_cloud, make_result
+from tests.gui.patience import wait_until_still
 
 BASELINES = Path(__file__).parents[1] / "data" / "baselines"
 SMALL = 64, 40
@@ -45,14 +47,8 @@ def look(window, name, qtbot):
     if name != "scene":
         window.panels.show_plot(view)
     take = view.screenshot if name == "scene" else lambda: view.grab().toImage()
-    looks = [take()]
-
-    def is_still():
-        looks.append(take())
-        return looks[-1] == looks[-2]
-
-    qtbot.waitUntil(is_still, timeout=20_000)
-    return looks[-1]
+    canvas = window.parts.scene.canvas
+    return wait_until_still(qtbot, take, lambda: canvas.seconds_to_draw == SETTLED_SECONDS)
 
 
 def small(image):

@@ -175,7 +175,7 @@ def test_that_a_split_pipe_is_two_and_merged_again_is_one(window, qtbot):
     )
     dialog.setDoubleValue(1.0)
     dialog.accept()
-    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=120_000)
+    qtbot.waitUntil(lambda: not window.jobs.is_busy)
     assert len(ids(window)) == len(before) + 1, window.panels.message.text.text()
     new_id = ids(window)[-1]
     result = window.document.result
@@ -187,7 +187,7 @@ def test_that_a_split_pipe_is_two_and_merged_again_is_one(window, qtbot):
     click(window, qtbot, new_id, CONTROL)
     qtbot.waitUntil(window.actions_["merge"].isEnabled)
     qtbot.keyClick(window, Qt.Key.Key_M, CONTROL)
-    qtbot.waitUntil(lambda: ids(window) == before, timeout=120_000)
+    qtbot.waitUntil(lambda: ids(window) == before)
     assert window.document.selection.element_id == 7
     assert "Merge Pipe 7" in window.panels.message.text.text()
     window.history.undo()
@@ -201,7 +201,7 @@ def test_that_pipes_that_cannot_be_merged_are_told_and_nothing_changes(window, q
     click(window, qtbot, 7)
     click(window, qtbot, 9, CONTROL)
     window.actions_["merge"].trigger()
-    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=120_000)
+    qtbot.waitUntil(lambda: not window.jobs.is_busy)
     assert "not of one size" in window.panels.message.text.text()
     assert window.panels.message.property("severity") == "error"
     assert window.document.result is result
@@ -215,7 +215,7 @@ def test_that_an_edit_of_what_was_changed_meanwhile_is_dropped(window, qtbot):
     click(window, qtbot, 9)
     qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
     kept = window.document.result
-    qtbot.waitUntil(lambda: not window.jobs.is_busy, timeout=120_000)
+    qtbot.waitUntil(lambda: not window.jobs.is_busy)
     assert window.document.result is kept
     assert "dropped" in window.panels.message.text.text()
 
@@ -238,7 +238,7 @@ def test_that_a_kind_is_chosen_and_measured_as_such(window, qtbot):
     assert "torus" not in dialog.comboBoxItems()
     dialog.setTextValue("flange")
     dialog.accept()
-    qtbot.waitUntil(lambda: window.document.result.element(2).kind == "flange", timeout=120_000)
+    qtbot.waitUntil(lambda: window.document.result.element(2).kind == "flange")
     assert not window.document.result.deformations_of(2)
 
 
@@ -292,7 +292,7 @@ def test_that_detecting_in_a_box_needs_a_box_and_keeps_the_rest(window, qtbot):
     window.do(commands.set_view, clip_box=Box(low, high))
     others = [e for e in window.document.result.elements if e.element_id not in (7, 9)]
     window.actions_["detect_in_box"].trigger()
-    qtbot.waitUntil(lambda: window.history.undo_text == "Detect again in the box", timeout=120_000)
+    qtbot.waitUntil(lambda: window.history.undo_text == "Detect again in the box")
     assert all(e in window.document.result.elements for e in others if e.element_id < 7)
 
 

@@ -14,6 +14,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QSignalSpy, QTest
 from PySide6.QtWidgets import QApplication
 
+from tests.gui.patience import PATIENCE
+
 SIZE = (520, 400)
 ELEMENTS = (2, 4, 7)
 
@@ -26,11 +28,10 @@ def main() -> None:
     scene = SceneView()
     scene.resize(*SIZE)
     scene.show()
-    QTest.qWaitForWindowExposed(scene)
+    assert QTest.qWaitForWindowExposed(scene, PATIENCE)
     scene.apply(scene_state(view=STILL))
-    while scene.canvas.is_moving or not scene.points.n_shown:
+    while scene.canvas.is_moving or scene.canvas._is_stale or not scene.points.n_shown:
         app.processEvents()
-    QTest.qWait(200)
     meant = [index for element in ELEMENTS for index in seen_points(scene, element, 3)]
     picked = []
     for index in meant:
@@ -58,7 +59,7 @@ def at_scale(scale: float) -> dict:
         env=os.environ | {"QT_SCALE_FACTOR": str(scale)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
     )
     return json.loads(said.stdout.splitlines()[-1])

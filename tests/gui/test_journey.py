@@ -12,6 +12,7 @@ from pipegui.parts import make_parts
 from pipegui.scene.canvas import SETTLED_SECONDS
 from pipegui.scene.colouring import PROFILE_COLOURS
 from tests.factories import make_cloud, make_result
+from tests.gui.patience import wait_until_still
 
 LEFT = Qt.MouseButton.LeftButton
 MANY = 60_000
@@ -29,16 +30,11 @@ def real_window(make_window):
 
 
 def wait_until_drawn(window, qtbot):
-    """Wait until the camera has settled and two looks at the 3D view see the same."""
-    looks = [window.parts.scene.screenshot()]
-
-    def is_still():
-        looks.append(window.parts.scene.screenshot())
-        is_settled = window.parts.scene.canvas.seconds_to_draw == SETTLED_SECONDS
-        return is_settled and looks[-1] == looks[-2]
-
-    qtbot.waitUntil(is_still, timeout=20_000)
-    return looks[-1]
+    """Wait until the camera has settled and the 3D view looks the same for a while."""
+    scene = window.parts.scene
+    return wait_until_still(
+        qtbot, scene.screenshot, lambda: scene.canvas.seconds_to_draw == SETTLED_SECONDS
+    )
 
 
 def pixels(image):

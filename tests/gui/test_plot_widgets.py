@@ -50,8 +50,8 @@ def click(qtbot, plot, position):
     qtbot.mouseClick(plot.canvas.viewport(), LEFT, pos=position)
 
 
-def hover_plot(qtbot, plot, position, is_told):
-    hover(qtbot, plot.canvas.viewport(), position, is_told)
+def hover_plot(qtbot, plot, plot_item, x, y, is_told):
+    hover(qtbot, plot.canvas.viewport(), lambda: at(plot, plot_item, x, y), is_told)
 
 
 @pytest.fixture
@@ -91,8 +91,8 @@ def test_that_hovering_reads_out_the_profile(radius, qtbot):
     profiles = RESULT.profiles.of_element(2, 0)
     radius.resize(900, 480)  # room for the whole line
     lay_out(radius)
-    position = at(radius, radius.radius, 20, 1000 * profiles.semi_minor[20])
-    hover_plot(qtbot, radius, position, lambda: "Profile 20" in radius.readout.text())
+    y = 1000 * profiles.semi_minor[20]
+    hover_plot(qtbot, radius, radius.radius, 20, y, lambda: "Profile 20" in radius.readout.text())
     assert f"{profiles.chainage[20]:.3f} m" in radius.readout.text()
     assert "±" in radius.readout.text()
 
@@ -174,11 +174,13 @@ def test_that_a_click_into_an_outline_names_the_deformation(unrolled, qtbot):
 
 def test_that_hovering_reads_the_dent_off_the_map(unrolled, qtbot):
     dent = RESULT.deformation(1)
-    position = at(unrolled, unrolled.plot, dent.chainage, np.rad2deg(dent.clock))
-    hover_plot(qtbot, unrolled, position, lambda: bool(unrolled.readout.text().strip()))
-    text = unrolled.readout.text()
-    assert "inward" in text or "not scanned" in text
-    assert "m · 1:" in text
+    x, y = dent.chainage, np.rad2deg(dent.clock)
+
+    def is_told():
+        text = unrolled.readout.text()
+        return ("inward" in text or "not scanned" in text) and "m · 1:" in text
+
+    hover_plot(qtbot, unrolled, unrolled.plot, x, y, is_told)
 
 
 def test_that_a_deformation_over_six_o_clock_is_outlined_on_both_sides(unrolled):
@@ -320,10 +322,15 @@ def test_that_hovering_the_map_tells_the_spot_and_leaving_it_nothing(qtbot):
     plot = shown(qtbot, DeviationMap(), states(Selection(1, 2)).map)
     told = []
     plot.spot_hovered.connect(told.append)
-    for chainage, clock_deg in ((0.8, 40), (1.0, 300)):
-        y = clock_deg if clock_deg <= 180 else clock_deg - 360
-        spot = pytest.approx((chainage, np.deg2rad(clock_deg)), abs=0.02)
-        hover_plot(qtbot, plot, at(plot, plot.plot, chainage, y), lambda s=spot: told[-1:] == [s])
+
+    def is_at(x, y):
+        if not told or told[-1] is None:
+            return False
+        chainage, clock = told[-1]
+        return abs(chainage - x) < 0.02 and abs(np.rad2deg(clock) - y % 360) < 3
+
+    for x, y in ((0.8, 40), (1.0, -60)):
+        hover_plot(qtbot, plot, plot.plot, x, y, lambda x=x, y=y: bool(is_at(x, y)))
     QApplication.sendEvent(plot, QEvent(QEvent.Type.Leave))
     assert told[-1] is None
 
@@ -332,9 +339,9 @@ def test_that_hovering_a_point_of_the_radius_plot_tells_its_profile(radius, qtbo
     told = []
     radius.profile_hovered.connect(told.append)
     profiles = radius._state.shown
-    position = at(radius, radius.radius, 20, 1000 * profiles.semi_minor[20])
+    y = 1000 * profiles.semi_minor[20]
     key = ProfileKey(int(profiles.stack_id[20]), int(profiles.profile_index[20]))
-    hover_plot(qtbot, radius, position, lambda: told[-1:] == [key])
+    hover_plot(qtbot, radius, radius.radius, 20, y, lambda: told[-1:] == [key])
     QApplication.sendEvent(radius, QEvent(QEvent.Type.Leave))
     assert told[-1] is None
 
@@ -345,14 +352,13 @@ def test_that_hovering_a_point_of_the_section_tells_where_on_the_pipe_it_is(sect
     cut, profile = section._state.cut, section._state.profile
     section.factor.setValue(1)
     u, v = cut.points_uv[np.argmax(cut.points_uv[:, 0])]
-    position = at(section, section.plot, u, v)
 
     def is_told():
         chainage, clock = told[-1] if told and told[-1] else (np.nan, np.nan)
         away = np.hypot(u, v) * abs(np.sin(clock - np.arctan2(u, v)))
         return bool(chainage == pytest.approx(profile.chainage[0]) and away < 10)
 
-    hover_plot(qtbot, section, position, is_told)
+    hover_plot(qtbot, section, section.plot, u, v, is_told)
     QApplication.sendEvent(section, QEvent(QEvent.Type.Leave))
     assert told[-1] is None
 

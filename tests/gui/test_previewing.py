@@ -18,6 +18,7 @@ from pipegui.plots.preview_view import PreviewView, summary_of, upright
 from pipegui.previewing import Previews
 from pipegui.view_state import resolve
 from tests.factories import make_cloud
+from tests.gui.patience import PATIENCE_S
 
 LEFT = Qt.MouseButton.LeftButton
 AXES = Settings().replace({"stacks.preset": "axes"})
@@ -66,18 +67,17 @@ def test_that_a_glance_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
 
     def slow(progress):
         running.set()
-        for _ in range(400):
+        while True:  # until it has to make way
             progress.update("thinning", 0.5)
             threading.Event().wait(0.01)
-        return "late"
 
     def quick(progress):
         return slow(progress) if not running.is_set() else "again"
 
     jobs.glance(quick, told.append, told.append)
-    assert running.wait(5)
+    assert running.wait(PATIENCE_S)
     started = QSignalSpy(jobs.started)
-    with qtbot.waitSignal(jobs.detected, timeout=3000):
+    with qtbot.waitSignal(jobs.detected):
         jobs.detect(CLOUD, Settings())
         assert jobs.is_busy  # though it has to wait for the glance to end
     assert [started.at(i) for i in range(started.count())] == [["Detecting"]]
@@ -86,7 +86,7 @@ def test_that_a_glance_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
 
 def test_that_a_newer_glance_replaces_one_that_waits(jobs, qtbot):
     told, release = [], threading.Event()
-    jobs._detect = lambda *_: release.wait(5)
+    jobs._detect = lambda *_: release.wait(PATIENCE_S)
     jobs.detect(CLOUD, Settings())
     jobs.glance(lambda _: "old", told.append, told.append)
     jobs.glance(lambda _: "new", told.append, told.append)
@@ -98,7 +98,7 @@ def test_that_a_glance_that_fails_says_why(jobs, qtbot):
     none = Settings().replace({"stacks.preset": "none"})
     told = []
     jobs.glance(lambda p: plan_stacks(CLOUD, none, p), lambda _: told.append("?"), told.append)
-    qtbot.waitUntil(lambda: bool(told), timeout=20_000)
+    qtbot.waitUntil(lambda: bool(told))
     assert "no stacks to cut" in told[0]
 
 
@@ -129,7 +129,7 @@ def test_that_nothing_is_planned_while_nobody_looks(jobs, qtbot):
     qtbot.wait(500)
     assert seen.plan is None
     seen.previews.watch_list(True)
-    qtbot.waitUntil(lambda: seen.plan is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: seen.plan is not None)
     assert [s.stack.name for s in seen.plan.stacks][:3] == ["X", "Y", "Z"]
     assert seen.profile is None  # nobody looks at the profile
 
@@ -138,7 +138,7 @@ def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
     seen = Seen(jobs)
     seen.previews.watch_profile(True)
     seen.previews.apply(CLOUD, AXES)
-    qtbot.waitUntil(lambda: seen.profile is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: seen.profile is not None)
     first = seen.profile
     assert first.profile_index == seen.plan.stacks[0].fullest
     seen.previews.step(1)
@@ -160,7 +160,7 @@ def test_that_steps_end_at_the_ends(jobs, qtbot):
     seen = Seen(jobs)
     seen.previews.watch_profile(True)
     seen.previews.apply(CLOUD, AXES)
-    qtbot.waitUntil(lambda: seen.profile is not None, timeout=20_000)
+    qtbot.waitUntil(lambda: seen.profile is not None)
     seen.previews.step(10**6)
     assert seen.profiles[-1].index == seen.plan.stacks[0].last
     seen.previews.step(-(10**6))

@@ -4,7 +4,6 @@ import csv
 import subprocess
 import sys
 import textwrap
-import time
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from pipegui.parts import make_parts
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 LEFT = Qt.MouseButton.LeftButton
-PATIENCE = 300_000
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +57,9 @@ def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
 
     window = opened()
     window.open_files([laz])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled, timeout=PATIENCE)
+    qtbot.waitUntil(window.actions_["detect"].isEnabled)
     qtbot.keyClick(window, Qt.Key.Key_D, CONTROL)
-    qtbot.waitUntil(
-        lambda: window.document.result is not None and is_idle(window), timeout=PATIENCE
-    )
+    qtbot.waitUntil(lambda: window.document.result is not None and is_idle(window))
     result = window.document.result
     [dent] = [d for d in result.deformations if d.kind == "dent"]
     dented = dent.element_id
@@ -76,7 +72,7 @@ def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
     dialog = window.findChild(QInputDialog, "ask")
     dialog.setDoubleValue(0.6)
     dialog.accept()
-    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Split"), timeout=PATIENCE)
+    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Split"))
     parts = [e.element_id for e in window.document.result.elements if e.radius > 0.08]
     assert len(parts) == 2
     depths = [1000 * d.depth for d in window.document.result.deformations if d.kind == "dent"]
@@ -84,7 +80,7 @@ def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
     click(window, qtbot, parts[0])
     click(window, qtbot, parts[1], CONTROL)
     qtbot.keyClick(window, Qt.Key.Key_M, CONTROL)
-    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Merge"), timeout=PATIENCE)
+    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Merge"))
     merged = window.document.result.element(parts[0])
     assert merged.radius == pytest.approx(result.element(dented).radius, abs=0.0003)
     for _ in range(2):
@@ -102,13 +98,13 @@ def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
     window.parts.scene.set_standard_view("top")
     camera = window.parts.scene.camera()
     qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
-    qtbot.waitUntil(lambda: path.is_file() and is_idle(window), timeout=PATIENCE)
+    qtbot.waitUntil(lambda: path.is_file() and is_idle(window))
     assert window.close()
 
     # Another day.
     again = opened()
     again.open_files([path])
-    qtbot.waitUntil(lambda: again.document.scan is not None and is_idle(again), timeout=PATIENCE)
+    qtbot.waitUntil(lambda: again.document.scan is not None and is_idle(again))
     assert [e.element_id for e in again.document.result.elements] == [
         e.element_id for e in result.elements if e.element_id != thin
     ]
@@ -159,21 +155,19 @@ def test_that_work_outlives_a_process_that_was_killed(make_window, qtbot, tmp_pa
 
     laz, folder = tmp_path / "plant.laz", tmp_path / "unsaved"
     write_laz(laz, make_scan(2000)[0])
-    began = time.monotonic()
     killed = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(KILLED), str(laz), str(folder)],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
     assert killed.returncode == -9, killed.stderr
-    assert time.monotonic() - began < 120
     window = make_window(read=read_file, rescue=folder)
     window.projects.rescue.offer()
     restore, _ = window.panels.message.answer_buttons
     qtbot.mouseClick(restore, LEFT)
-    qtbot.waitUntil(lambda: window.document.result is not None, timeout=PATIENCE)
+    qtbot.waitUntil(lambda: window.document.result is not None)
     assert window.document.result.element(2).label == "Feed line"
     assert window.isWindowModified()
-    qtbot.waitUntil(lambda: len(list(folder.glob("*.pipegui"))) == 1, timeout=PATIENCE)
+    qtbot.waitUntil(lambda: len(list(folder.glob("*.pipegui"))) == 1)

@@ -47,7 +47,7 @@ def test_that_a_part_of_the_points_is_clipped_at_once_and_all_soon(large, qtbot,
     # Before anything else has had its turn: few, but none that should not be seen.
     assert 0 < len(large.points) < 5_000
     assert np.isin(rows_of(large.points), inside).all()
-    qtbot.waitUntil(lambda: len(large.points) == len(inside), timeout=10_000)
+    qtbot.waitUntil(lambda: len(large.points) == len(inside))
     settle(qtbot, large)
     assert np.isin(rows_of(large.points), inside).all()
 
@@ -57,7 +57,7 @@ def test_that_hidden_elements_of_a_large_cloud_are_never_seen(large, qtbot):
     show(large, hidden_elements=frozenset({2}))
     assert not np.isin(rows_of(large.points), hidden).any()
     n_seen = len(CLOUD) - len(hidden)
-    qtbot.waitUntil(lambda: len(large.points) == n_seen, timeout=10_000)
+    qtbot.waitUntil(lambda: len(large.points) == n_seen)
     assert not np.isin(rows_of(large.points), hidden).any()
 
 

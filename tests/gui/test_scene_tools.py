@@ -116,7 +116,12 @@ def test_that_the_line_follows_the_cursor_to_the_second_point(desk, qtbot):
     desk.click(on_screen(desk.scene, first))
     told = []
     desk.scene.hovered.connect(told.append)
-    hover(qtbot, desk.scene.canvas, on_screen(desk.scene, second), lambda: told[-1:] == [second])
+    hover(
+        qtbot,
+        desk.scene.canvas,
+        lambda: on_screen(desk.scene, second),
+        lambda: told[-1:] == [second],
+    )
     QApplication.processEvents()
     (mark,) = desk.scene.overlay.marks
     distance = np.linalg.norm(CLOUD.xyz[second] - CLOUD.xyz[first])

@@ -19,11 +19,12 @@ from pipegui.document import (
     ViewOptions,
 )
 from pipegui.scene import pose as poses
+from pipegui.scene.canvas import SETTLED_SECONDS
 from pipegui.scene.shapes import ellipses
 from pipegui.scene.view import SceneView
 from pipegui.view_state import resolve
 from tests.factories import make_scan
-from tests.gui.patience import hover
+from tests.gui.patience import PATIENCE, hover
 
 CLOUD, RESULT = make_scan()
 STILL = ViewOptions(fly=False, colour_by=ColourBy.SEGMENT, show_labels=False)
@@ -185,9 +186,11 @@ def test_that_fewer_points_are_drawn_while_moving_and_all_at_rest(qtbot, no_leak
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
     view.points.seconds_per_point = 1e-5  # as on a slow machine
+    view.canvas._resting.setInterval(PATIENCE)
     with qtbot.waitSignal(view.canvas.drawn):
         view.set_standard_view("top")
     assert view.points.n_shown < 60_000
+    view.canvas._resting.start(0)
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
     view.close()
@@ -204,9 +207,9 @@ def test_that_selecting_flies_to_the_element_and_colours_it(scene, qtbot):
     flying = replace(STILL, fly=True)
     scene.apply(scene_state(Selection(1, 6), flying))
     assert scene.canvas.pose.position == pytest.approx(before.position, abs=1e-6)
-    qtbot.waitUntil(lambda: scene.canvas.pose.distance < 0.6 * before.distance, timeout=20_000)
+    qtbot.waitUntil(lambda: scene.canvas.pose.distance < 0.6 * before.distance)
     # Close by, the points of the picture come a moment after the camera has come to rest.
-    qtbot.waitUntil(lambda: n_accented() > 2000, timeout=20_000)
+    qtbot.waitUntil(lambda: n_accented() > 2000)
 
 
 def test_that_it_does_not_fly_where_flying_is_off(scene):
@@ -230,7 +233,7 @@ def test_that_hovering_tells_the_element_under_the_cursor(scene, qtbot):
     (index, *_) = seen_points(scene, 7)
     told = []
     scene.hovered.connect(told.append)
-    hover(qtbot, scene.canvas, on_screen(scene, index), lambda: told[-1:] == [index])
+    hover(qtbot, scene.canvas, lambda: on_screen(scene, index), lambda: told[-1:] == [index])
     assert RESULT.element_id[told[-1]] == 7
 
 
@@ -246,6 +249,14 @@ def test_that_only_what_differs_is_done_anew(scene, qtbot, monkeypatch):
 
 
 def test_that_an_idle_repaint_does_not_draw_the_points_again(scene, qtbot):
+    canvas = scene.canvas
+    qtbot.waitUntil(
+        lambda: (
+            canvas.seconds_to_draw == SETTLED_SECONDS
+            and not canvas._settling.isActive()
+            and not canvas._is_stale
+        )
+    )
     with qtbot.assertNotEmitted(scene.canvas.drawn):
         scene.overlay.update()
         scene.canvas.update()
@@ -269,7 +280,6 @@ def test_that_every_colouring_and_decoration_can_be_shown(scene, qtbot):
 
 def test_that_closing_the_scan_empties_the_view(scene, qtbot):
     scene.apply(resolve(Document()).scene)
-    qtbot.wait(50)
     assert scene.points.n_shown == 0
     colours = picture(scene)[:, :, 0]
     assert np.ptp(colours[:300, 100:]) < 30
@@ -405,7 +415,7 @@ def test_that_all_points_in_the_picture_are_drawn_once_a_close_view_rests(
     index = int(np.flatnonzero(result.element_id == 7)[200])
     close = poses.zoom(view.canvas.pose, 0.25, cloud.xyz[index].astype(float))
     view.canvas.move_to(close)
-    qtbot.waitUntil(lambda: view.layers.close_up.n_shown > 0, timeout=10_000)
+    qtbot.waitUntil(lambda: view.layers.close_up.n_shown > 0)
     pixels, depth = view.canvas.projection().to_screen(cloud.xyz.astype(float))
     inside = ((pixels >= 0) & (pixels <= [640, 480])).all(axis=1) & (depth > 0)
     assert view.layers.close_up.n_shown == pytest.approx(inside.sum(), abs=3)

@@ -14,6 +14,7 @@ from pipegui.document import Box
 from pipegui.panels.clip_bar import ClipBar
 from pipegui.view_state import ClipState
 from tests.factories import make_cloud
+from tests.gui.patience import PATIENCE_S
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -131,7 +132,7 @@ def test_that_a_scan_is_seen_while_it_is_read(make_window, qtbot):
 
     def read(path, settings, progress):
         progress.look(part)
-        assert go_on.wait(10)
+        assert go_on.wait(PATIENCE_S)
         return cloud
 
     window = make_window(read=read)
@@ -148,10 +149,9 @@ def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_window, qt
 
     def read(path, settings, progress):
         progress.look(cloud)
-        for _ in range(1000):
+        while True:
             progress.update("reading", 0.1)
             time.sleep(0.01)
-        return cloud
 
     window = make_window(read=read)
     window.open_files([Path("plant.laz")])
