@@ -16,6 +16,8 @@ PATIENCE_S = PATIENCE / 1000
 """For what is not Qt's."""
 REST = 2_000
 """For so long the mouse lies still before a hand moves it again."""
+APART = 50
+"""pyqtgraph takes no notice of moves that come faster than 100 in a second."""
 ASIDE = QPoint(3, 3)
 
 
@@ -57,6 +59,7 @@ def hover(
     for i in range(1, n_tries + 1):
         at = place()
         qtbot.mouseMove(widget, at + ASIDE)
+        qtbot.wait(APART)
         qtbot.mouseMove(widget, at)
         try:
             qtbot.waitUntil(is_told, timeout=REST)
