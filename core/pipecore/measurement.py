@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,6 @@ from pipecore.types import NO_ID, Deformation, Element, Profiles
 
 Array = NDArray[np.float64]
 
-AT_ONCE = 32
-"""Elements whose points are held at once until they are given to them in their order."""
 N_SAMPLES = 16
 """Places along an axis at which its neighbours are looked for."""
 
@@ -67,30 +66,26 @@ def measure_elements(
     everything = built.elements + others
     boxes = _boxes(everything)
     element_id, deviation = _of_no_element(n_points, allocate)
-    measured: list[_Measured] = []
-    n = len(built.elements)
-    for start in range(0, n, AT_ONCE):
-        batch: list[_Measured | None] = [None] * min(AT_ONCE, n - start)
+    measured: dict[int, _Measured] = {}
+    # The largest first: at the end of one that is begun late the other threads would wait.
+    order = sorted(range(len(built.elements)), key=lambda i: -_size(built.elements[i]))
+    assigning = Lock()
 
-        def work(
-            i: int,
-            check: Callable[[], None],
-            start: int = start,
-            batch: list[_Measured | None] = batch,
-        ) -> None:
-            element = built.elements[start + i]
-            neighbours = neighbours_of(element, everything, boxes)
-            batch[i] = _measure(element, neighbours, nearby, width, settings, fit, check)
-
-        for_items(work, len(batch), "deformations", progress, (start / n, (start + len(batch)) / n))
-        for found in filter(None, batch):
+    def work(k: int, check: Callable[[], None]) -> None:
+        element = built.elements[order[k]]
+        neighbours = neighbours_of(element, everything, boxes)
+        found = _measure(element, neighbours, nearby, width, settings, fit, check)
+        with assigning:
             _assign(found, element_id, deviation)
-            measured.append(replace(found, index=_NONE, deviation=_NONE))
+            measured[order[k]] = replace(found, index=_NONE, deviation=_NONE)
+
+    for_items(work, len(order), "deformations", progress)
+    in_order = [measured[i] for i in range(len(order))]
     progress.update("deformations", 1.0)
     return Measurement(
-        tuple(m.element for m in measured),
-        Profiles.concatenate([m.profiles for m in measured]),
-        tuple(d for m in measured for d in m.deformations),
+        tuple(m.element for m in in_order),
+        Profiles.concatenate([m.profiles for m in in_order]),
+        tuple(d for m in in_order for d in m.deformations),
         element_id,
         deviation,
     )
@@ -164,39 +159,48 @@ def _measure(
 def _assign(
     found: _Measured, element_id: NDArray[np.int32], deviation: NDArray[np.float32]
 ) -> None:
-    """Give an element its points: where elements meet, a point is of the one it fits better."""
-    taken = element_id[found.index] != NO_ID
-    closer = ~taken | (np.abs(found.deviation) < np.abs(deviation[found.index]))
+    """Give an element its points: where elements meet, a point is of the one it fits better.
+
+    Of two that it fits alike it is the first one's, in whatever order they come.
+    """
+    other = element_id[found.index]
+    here, there = np.abs(found.deviation), np.abs(deviation[found.index])
+    is_first = found.element.element_id < other
+    closer = (other == NO_ID) | (here < there) | ((here == there) & is_first)
     own = found.index[closer]
     element_id[own] = found.element.element_id
     deviation[own] = found.deviation[closer]
 
 
-def _boxes(elements: Sequence[Element]) -> tuple[Array, Array]:
-    """Lowest and highest coordinates of the elements' axes, each (n, 3)."""
+def _size(element: Element) -> float:
+    """About how many points an element has beside others: the area of its surface."""
+    return element.axis.length * max(element.radius, element.radius_end)
+
+
+def _boxes(elements: Sequence[Element]) -> tuple[Array, Array, Array]:
+    """Lowest and highest coordinates of the elements' axes, each (n, 3), and their radii (n,)."""
     low, high = np.empty((2, len(elements), 3))
     for i, element in enumerate(elements):
         samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
         # Between its samples an arc leaves their box by less than half a step.
         half_step = 0.5 * element.axis.length / (N_SAMPLES - 1)
         low[i], high[i] = samples.min(axis=0) - half_step, samples.max(axis=0) + half_step
-    return low, high
+    return low, high, np.array([max(e.radius, e.radius_end) for e in elements])
 
 
 def neighbours_of(
-    element: Element, elements: Sequence[Element], boxes: tuple[Array, Array]
+    element: Element, elements: Sequence[Element], boxes: tuple[Array, Array, Array]
 ) -> list[Element]:
     """Elements whose surfaces may come near: their axis passes within reach of its own.
 
-    `boxes` are those of the elements' axes; most elements are far off by them alone.
+    `boxes` are those of the elements' axes and their radii; most are far off by them alone.
     """
     samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
     step = element.axis.length / (N_SAMPLES - 1)
     radius = max(element.radius, element.radius_end)
-    radii = np.array([max(e.radius, e.radius_end) for e in elements])
+    low, high, radii = boxes
     # Within reach of an end along the axis, and of the axis across it.
     furthest = (2.0 * (1.2 * (radius + radii) + step))[:, None]
-    low, high = boxes
     apart = (low - furthest > samples.max(axis=0)) | (high + furthest < samples.min(axis=0))
     near = []
     for i in np.flatnonzero(~apart.any(axis=1)).tolist():

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipecore._kernels.grouping import group_from
 from pipecore.deformation.deviation_map import (
     Flags,
     Grid,
@@ -56,17 +55,15 @@ class Surface:
     foreign: Flags
 
     @cached_property
-    def _by_row(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """The points that belong in the order of their rows, and where those of each begin."""
+    def _row(self) -> NDArray[np.int32]:
+        """The row of each point, -1 if it does not belong."""
         row = np.where(self.belongs, self.cell // self.grid.n_columns, -1)
-        members, starts = group_from(row, 0, self.grid.n_rows)
-        return members, starts
+        return row.astype(np.int32)
 
     def own_near(self, chainage: float, reach: float) -> NDArray[np.intp]:
-        """Points that belong, in order, in rows that may hold some within reach of a chainage."""
-        members, starts = self._by_row
+        """Points that belong, in rows that may hold some within reach of a chainage."""
         rows = self.grid.rows_near(chainage, reach + self.grid.row_size)
-        return np.sort(members[starts[rows.start] : starts[rows.stop]])
+        return np.flatnonzero((self._row >= rows.start) & (self._row < rows.stop))
 
 
 def own_surface(element: Element, points: Unrolled) -> Surface | None:

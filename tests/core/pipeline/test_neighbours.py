@@ -22,8 +22,8 @@ def element(rng, i):
 
 def test_that_boxes_leave_out_no_neighbour(rng):
     elements = [element(rng, i) for i in range(60)]
-    everything = np.array([[-1e9] * 3] * 60), np.array([[1e9] * 3] * 60)
     boxes = _boxes(elements)
+    everything = np.array([[-1e9] * 3] * 60), np.array([[1e9] * 3] * 60), boxes[2]
     n_near = 0
     for e in elements:
         near = neighbours_of(e, elements, boxes)
