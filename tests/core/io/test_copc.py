@@ -134,6 +134,19 @@ def test_that_a_box_cuts_plain_files_too(rng, points, tmp_path):
     assert len(found) == 2 * len(inside(io.read(path), box)) > 0
 
 
+def test_that_nodes_without_points_are_passed_over(rng, written):
+    # Writers tell of them where only their children have points.
+    path, tree = written
+    whole, box = io.read(path), box_around(rng)
+    *branch, place, n_bytes, n = tree.pages[0][-1]
+    tree.pages[0][-1] = (*branch, place, n_bytes + ENTRY.size, n)
+    tree.pages[-1].append((9, 0, 0, 0, 0, 0, 0))
+    write_tree(path, tree)
+    assert is_octree_used(path)
+    assert_array_equal(io.read(path).xyz, whole.xyz)
+    assert len(io.read(path, box=box)) == len(inside(whole, box))
+
+
 def set_entry(tree, page, row, **changes):
     names = ("level", "x", "y", "z", "place", "n_bytes", "n")
     entry = dict(zip(names, tree.pages[page][row], strict=True)) | changes
