@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from pipecore._kernels.series import solve_in_place
+from pipecore._kernels.linear import mirror, solve_in_place
 
 BELL, CONE, FRUSTUM = 0, 1, 2
 
@@ -77,9 +77,7 @@ def gather(form, p, along, around, deviation, noise, slopes, middle, normal, rig
             right[k] -= slopes[i, k] * residual
             for m in range(k + 1):
                 normal[k, m] += slopes[i, k] * slopes[i, m]
-    for k in range(n_free):
-        for m in range(k):
-            normal[m, k] = normal[k, m]
+    mirror(normal)
     return total
 
 

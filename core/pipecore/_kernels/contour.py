@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.linear import factorise_band, solve_by_band
+
 
 @njit(cache=True, nogil=True)
 def list_cells(height, variance, used, floor):
@@ -76,43 +78,6 @@ def normal_equations(first, basis, harmonics, starts, column, height, weight, ba
                     # Below the diagonal only.
                     for k in range(0 if b < a else m, n_terms):
                         band[at + m, row + k - at - m] += product * moments[k, m]
-
-
-@njit(cache=True, nogil=True)
-def factorise_band(band):
-    """Turn a lower band of a positive definite matrix, band[j, i - j], into its Cholesky factor."""
-    size, width = band.shape
-    for j in range(size):
-        root = math.sqrt(band[j, 0])
-        reach = min(width, size - j)
-        for i in range(reach):
-            band[j, i] /= root
-        for k in range(1, reach):
-            for i in range(reach - k):
-                band[j + k, i] -= band[j, k] * band[j, k + i]
-
-
-@njit(cache=True, nogil=True)
-def solve_by_band(band, right):
-    """Solve by a factor of `factorise_band`; `right` becomes the solution."""
-    size, width = band.shape
-    for j in range(size):
-        right[j] /= band[j, 0]
-        for i in range(1, min(width, size - j)):
-            right[j + i] -= band[j, i] * right[j]
-    for j in range(size - 1, -1, -1):
-        for i in range(1, min(width, size - j)):
-            right[j] -= band[j, i] * right[j + i]
-        right[j] /= band[j, 0]
-
-
-@njit(cache=True, nogil=True)
-def inverse_by_band(band, inverse):
-    """Write the whole inverse of a matrix with a factor of `factorise_band`."""
-    inverse[:, :] = 0.0
-    for i in range(inverse.shape[0]):
-        inverse[i, i] = 1.0
-        solve_by_band(band, inverse[i])
 
 
 @njit(cache=True, nogil=True)

@@ -41,6 +41,17 @@ _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11, _S12, _S13, _S14, 
 
 
 @njit(cache=True, nogil=True, inline="always")
+def longer(x, y, z, length2, u, v, w):
+    """Return the longer of two vectors and its squared length; that of the first is known."""
+    other = u * u + v * v + w * w
+    is_longer = other > length2
+    x = u if is_longer else x
+    y = v if is_longer else y
+    z = w if is_longer else z
+    return x, y, z, other if is_longer else length2
+
+
+@njit(cache=True, nogil=True, inline="always")
 def least_eigenpair(xx, xy, xz, yy, yz, zz):
     """Smallest eigenvalue and its unit eigenvector, nan if it is multiple.
 
@@ -63,20 +74,8 @@ def least_eigenpair(xx, xy, xz, yy, yz, zz):
     a0, b1, c2 = xx - value, yy - value, zz - value
     x, y, z = xy * yz - xz * b1, xz * xy - a0 * yz, a0 * b1 - xy * xy
     best = x * x + y * y + z * z
-    u, v, w = xy * c2 - xz * yz, xz * xz - a0 * c2, a0 * yz - xy * xz
-    length2 = u * u + v * v + w * w
-    is_longer = length2 > best
-    x = u if is_longer else x
-    y = v if is_longer else y
-    z = w if is_longer else z
-    best = length2 if is_longer else best
-    u, v, w = b1 * c2 - yz * yz, yz * xz - xy * c2, xy * yz - b1 * xz
-    length2 = u * u + v * v + w * w
-    is_longer = length2 > best
-    x = u if is_longer else x
-    y = v if is_longer else y
-    z = w if is_longer else z
-    best = length2 if is_longer else best
+    x, y, z, best = longer(x, y, z, best, xy * c2 - xz * yz, xz * xz - a0 * c2, a0 * yz - xy * xz)
+    x, y, z, best = longer(x, y, z, best, b1 * c2 - yz * yz, yz * xz - xy * c2, xy * yz - b1 * xz)
     scale = 1.0 / math.sqrt(max(best, _TINY))
     scale = scale if best > 0.0 else math.nan
     return value, scale * x, scale * y, scale * z

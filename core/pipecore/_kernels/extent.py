@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.grouping import group_by_label
-from pipecore._kernels.series import solve_in_place
+from pipecore._kernels.linear import solve_in_place
 
 OVAL_SECTORS = 36
 """Sectors around the axis whose means tell an oval section."""

@@ -8,6 +8,7 @@ import math
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.linear import mirror, solve_step
 from pipecore._kernels.surfaces import (
     CONE,
     CYLINDER,
@@ -24,8 +25,6 @@ NARROWING = 0.7
 LEAST_SCALE = 1e-5
 SETTLED = 0.02
 """A fit ends only when the scale changes by no more than this share."""
-LEAST_PIVOT = 1e-10
-"""A parameter adds at least this share to what the ones before it explain."""
 FACING = 0.3
 """Least cosine to the beam of points that tell the noise along it."""
 
@@ -95,7 +94,7 @@ def line_equations(surface, xyz, reach, residuals, normal, right):
         right[k] *= -scale
         for m in range(k + 1):
             normal[k, m] *= scale * scale
-            normal[m, k] = normal[k, m]
+    mirror(normal)
     return n_used
 
 
@@ -120,9 +119,7 @@ def weighted_normal_equations(kind, surface, xyz, reach, residuals, normal, righ
                 right[k] += weighted * residual
                 for m in range(k + 1):
                     normal[k, m] += weighted * row[m]
-    for k in range(p):
-        for m in range(k):
-            normal[m, k] = normal[k, m]
+    mirror(normal)
     return n_used
 
 
@@ -149,43 +146,6 @@ def moves_less(kind, surface, xyz, step, limit):
             change += row[k] * step[k]
         if not abs(change) < limit:
             return False
-    return True
-
-
-@njit(cache=True, nogil=True)
-def solve_step(normal, right, step):
-    """Solve for the step that lessens the residuals; False where the points do not carry one.
-
-    By Cholesky's method: what a parameter adds to those before it must not be next to nothing.
-    """
-    p = right.shape[0]
-    diagonal = np.empty(p)
-    for k in range(p):
-        diagonal[k] = math.sqrt(max(normal[k, k], 1e-300))
-    lower = np.empty((p, p))
-    for k in range(p):
-        for m in range(k + 1):
-            total = normal[k, m] / (diagonal[k] * diagonal[m])
-            for j in range(m):
-                total -= lower[k, j] * lower[m, j]
-            if m < k:
-                lower[k, m] = total / lower[m, m]
-            elif total > LEAST_PIVOT:
-                lower[k, k] = math.sqrt(total)
-            else:
-                return False
-        total = -right[k] / diagonal[k]
-        for j in range(k):
-            total -= lower[k, j] * step[j]
-        step[k] = total / lower[k, k]
-        if not math.isfinite(step[k]):
-            return False
-    for k in range(p - 1, -1, -1):
-        for j in range(k + 1, p):
-            step[k] -= lower[j, k] * step[j]
-        step[k] /= lower[k, k]
-    for k in range(p):
-        step[k] /= diagonal[k]
     return True
 
 
@@ -252,7 +212,8 @@ def judge_fit(kind, surface, xyz, reach, information, scatter, beam):
         for m in range(k + 1):
             information[k, m] *= slope / max(n, 1)
             scatter[k, m] *= n / (n - p) if n > p else math.nan
-            information[m, k], scatter[m, k] = information[k, m], scatter[k, m]
+    mirror(information)
+    mirror(scatter)
     for k in range(3):
         beam[k] /= max(n, 1)
     return n, spread_within(residuals, reach)

@@ -5,6 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.linear import solve_in_place
+
 
 @njit(cache=True, nogil=True)
 def write_terms(theta, order, derivative, terms):
@@ -18,26 +20,6 @@ def write_terms(theta, order, derivative, terms):
         for _ in range(derivative):
             a, b = -k * b, k * a
         terms[2 * k - 1], terms[2 * k] = a, b
-
-
-@njit(cache=True, nogil=True)
-def solve_in_place(normal, right):
-    """Solve a positive definite system by Cholesky's method; both are overwritten."""
-    p = right.shape[0]
-    for k in range(p):
-        for m in range(k + 1):
-            total = normal[k, m]
-            for j in range(m):
-                total -= normal[k, j] * normal[m, j]
-            normal[k, m] = math.sqrt(total) if m == k else total / normal[m, m]
-        total = right[k]
-        for j in range(k):
-            total -= normal[k, j] * right[j]
-        right[k] = total / normal[k, k]
-    for k in range(p - 1, -1, -1):
-        for j in range(k + 1, p):
-            right[k] -= normal[j, k] * right[j]
-        right[k] /= normal[k, k]
 
 
 @njit(cache=True, nogil=True)
@@ -217,9 +199,8 @@ def in_cells(theta, r, n_cells):
 def choose_order(rest, n_points, within, aic, upper):
     """Least order by Akaike's criterion (corrected for few points), and what it leaves.
 
-    `rest` holds a row for each term and one for the values, times the roots of the weights,
-    and is lost;
-    `upper` becomes the triangle of `orthogonalise`. Writes the criterion of each order.
+    `rest` holds a row for each term and one for the values, times the roots of the weights, and
+    is lost; `upper` becomes the triangle of `orthogonalise`. Writes the criterion of each order.
     """
     p = rest.shape[0] - 1
     whole = inner(rest[p], rest[p])

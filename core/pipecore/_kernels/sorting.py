@@ -7,9 +7,8 @@ that buckets are sorted beside each other, each in the processor's cache.
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.grouping import argsort_keys
 from pipecore._kernels.voxels import voxel_key
-
-DIGIT_BITS = 10
 
 
 @njit(cache=True, nogil=True)
@@ -54,34 +53,14 @@ def sort_bucket(xyz, first, edge, n_y, n_z, order, begins):
     for k in range(n):
         i = order[k]
         keys[k] = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
-    lowest = keys.min()
-    largest = keys.max() - lowest
-    keys -= lowest
-    points, other_keys, other_points = order.copy(), np.empty_like(keys), np.empty_like(order)
-    n_digits = 1 << DIGIT_BITS
-    place = np.empty(n_digits, np.int64)
-    shift = 0
-    while largest >> shift > 0:
-        place[:] = 0
-        for key in keys:
-            place[(key >> shift) & (n_digits - 1)] += 1
-        total = 0
-        for digit in range(n_digits):
-            count = place[digit]
-            place[digit] = total
-            total += count
-        for k in range(n):
-            digit = (keys[k] >> shift) & (n_digits - 1)
-            to = place[digit]
-            other_keys[to] = keys[k]
-            other_points[to] = points[k]
-            place[digit] = to + 1
-        keys, other_keys = other_keys, keys
-        points, other_points = other_points, points
-        shift += DIGIT_BITS
+    sorted_rows = argsort_keys(keys - keys.min())
+    points = order.copy()
+    before = np.int64(0)
     for k in range(n):
-        order[k] = points[k]
-        begins[k] = k == 0 or keys[k] != keys[k - 1]
+        row = sorted_rows[k]
+        order[k] = points[row]
+        begins[k] = k == 0 or keys[row] != before
+        before = keys[row]
 
 
 @njit(cache=True, nogil=True)

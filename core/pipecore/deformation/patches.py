@@ -87,7 +87,7 @@ def find_patches(
     grid = cells.grid
     some = cells.count > 0
     variance = np.where(some, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
-    weight = np.where(some, cells.count / cells.noise**2, 0.0)
+    weight = np.divide(cells.count, cells.noise**2, where=some, out=np.zeros(grid.shape))
     allowed = cells.covered & ~cells.disputed
     bumps = MatchedFilter.of(grid, weight, cells.count, allowed)
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import contour as kernels
+from pipecore._kernels.linear import inverse_by_band
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
@@ -92,7 +93,7 @@ class Contour:
     def covariance(self) -> Array:
         """Covariance of the coefficients, shape (splines, terms, splines, terms)."""
         inverse = np.empty((len(self.factor), len(self.factor)))
-        kernels.inverse_by_band(self.factor, inverse)
+        inverse_by_band(self.factor, inverse)
         return inverse.reshape(*self.coefficients.shape * 2)
 
     @cached_property

@@ -58,23 +58,6 @@ def test_that_the_normal_equations_are_those_of_the_whole_design(parts):
     assert_allclose(right, design.T @ (weight * height).ravel(), atol=1e-12)
 
 
-def test_that_a_band_is_factorised_and_solved(rng):
-    root = np.tril(np.triu(rng.normal(size=(9, 9)), -3)) + 3 * np.eye(9)
-    matrix, right = root @ root.T, rng.normal(size=9)
-    band = np.zeros((9, 4))
-    for i in range(4):
-        band[: 9 - i, i] = np.diagonal(matrix, -i)
-    expected = np.linalg.solve(matrix, right)
-    kernels.factorise_band(band)
-    for i in range(4):
-        assert_allclose(band[: 9 - i, i], np.diagonal(np.linalg.cholesky(matrix), -i))
-    kernels.solve_by_band(band, right)
-    assert_allclose(right, expected)
-    inverse = np.empty((9, 9))
-    kernels.inverse_by_band(band, inverse)
-    assert_allclose(inverse, np.linalg.inv(matrix), atol=1e-12)
-
-
 def test_that_heights_and_residuals_are_those_of_the_coefficients(parts, rng):
     table, splines, height, variance = parts
     coefficients = rng.normal(size=(table.shape[1], splines[2].shape[1]))

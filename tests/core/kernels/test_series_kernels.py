@@ -56,14 +56,6 @@ def test_that_strays_are_those_far_from_a_weighted_fit(rng):
     assert scale < 0.02
 
 
-def test_that_a_positive_definite_system_is_solved(rng):
-    design = rng.normal(size=(9, 4))
-    normal, right = design.T @ design, rng.normal(size=4)
-    expected = np.linalg.solve(normal, right)
-    series.solve_in_place(normal, right)
-    assert_allclose(right, expected, rtol=1e-8)
-
-
 def test_that_the_triangle_solves_least_squares(rng):
     a, b = rng.normal(size=(30, 5)), rng.normal(size=30)
     upper = np.empty((5, 6))

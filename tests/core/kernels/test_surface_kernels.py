@@ -134,18 +134,6 @@ def test_that_a_fit_is_judged_by_the_sums_over_its_points(rng, kind):
     assert_allclose(found, expected, atol=1e-12)
 
 
-def test_that_a_step_is_not_solved_for_where_the_points_carry_none(rng):
-    step = np.empty(4)
-    design = rng.normal(size=(20, 4))
-    normal, right = design.T @ design, rng.normal(size=4)
-    assert fitting.solve_step(normal, right, step)
-    assert_allclose(normal @ step, -right, atol=1e-9)
-    design[:, 3] = design[:, 0] - design[:, 1]
-    assert not fitting.solve_step(design.T @ design, right, step)
-    normal[0, 0] = np.nan
-    assert not fitting.solve_step(normal, right, step)
-
-
 def axes_of(rng):
     q = random_rotation(rng)
     return (
