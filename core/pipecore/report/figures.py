@@ -51,8 +51,8 @@ FINEST_CELLS_AROUND = 60
 POINTS_PER_CELL = 6
 SECTION_CELLS = 72
 
-Points = tuple[Array, Array, Array]
-"""Chainage, clock and deviation of an element's points."""
+Points = tuple[Array, Array, Array, Array]
+"""Chainage, clock, deviation, and height over the fitted radius of an element's points."""
 
 
 def draw_deformation(
@@ -131,13 +131,13 @@ def _drawn_depth(deformation: Deformation) -> float:
 def _points_of(
     element: Element, cloud: PointCloud, result: Result, rows: NDArray[np.intp]
 ) -> Points:
-    """Chainage, clock and deviation of an element's points."""
-    chainage, _, clock = element.axis.pipe_coordinates(np.asarray(cloud.xyz[rows], np.float64))
-    return chainage, clock, np.asarray(result.deviation[rows], np.float64)
+    chainage, rho, clock = element.axis.pipe_coordinates(np.asarray(cloud.xyz[rows], np.float64))
+    deviation = np.asarray(result.deviation[rows], np.float64)
+    return chainage, clock, deviation, rho - element.radius_at(chainage)
 
 
 def _draw_map(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
-    chainage, clock, deviation = points
+    chainage, clock, deviation, _ = points
     reach = (deformation.chainage_end - deformation.chainage_start) / 2 + 2 * element.radius
     low = max(0.0, deformation.chainage - reach)
     high = min(element.axis.length, deformation.chainage + reach)
@@ -187,10 +187,7 @@ def _set_clock_ticks(axes: Axes, middle: float) -> None:
 
 
 def _draw_section(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
-    chainage, clock, deviation = points
-    half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
-    near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
-    angle, mean = _means_around(clock[near], deviation[near])
+    angle, mean = section_around(deformation, points)
     radius = float(element.radius_at(deformation.chainage))
     # So exaggerated that the deviation is a fifth of the radius, by a round factor.
     exaggeration = max(1, round(radius / 5 / _drawn_depth(deformation)))
@@ -209,15 +206,26 @@ def _draw_section(axes: Axes, deformation: Deformation, element: Element, points
     axes.margins(0.12)
     axes.set(
         xlabel="mm",
-        title=f"section, 12:00 up, deviations × {exaggeration}",
+        title=f"section, 12:00 up, departures × {exaggeration}",
     )
 
 
-def _means_around(clock: Array, deviation: Array) -> tuple[Array, Array]:
-    """Clock and mean deviation of the points in each cell around the pipe that has some."""
+def section_around(deformation: Deformation, points: Points) -> tuple[Array, Array]:
+    """Clock and mean height over the fitted radius of the points around an ovality's peak.
+
+    Not their deviations: those are from the section's own curve, which is oval itself.
+    """
+    chainage, clock, deviation, height = points
+    half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
+    near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
+    return _means_around(clock[near], height[near])
+
+
+def _means_around(clock: Array, height: Array) -> tuple[Array, Array]:
+    """Clock and mean height of the points in each cell around the pipe that has some."""
     cell = np.floor(clock / (2 * np.pi) * SECTION_CELLS).astype(np.intp) % SECTION_CELLS
     count = np.bincount(cell, minlength=SECTION_CELLS)
-    total = np.bincount(cell, weights=deviation, minlength=SECTION_CELLS)
+    total = np.bincount(cell, weights=height, minlength=SECTION_CELLS)
     seen = count > 0
     middle = (np.arange(SECTION_CELLS) + 0.5) * 2 * np.pi / SECTION_CELLS
     return middle[seen], total[seen] / count[seen]

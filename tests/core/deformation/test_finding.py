@@ -159,11 +159,14 @@ def test_that_a_straight_pipe_is_straight(rng):
     assert finding.straightness < 0.0015
 
 
-def test_that_a_dent_in_a_bowed_pipe_is_told_from_the_bow(rng):
+def test_that_dents_in_bowed_pipes_are_told_from_the_bow(rng):
     scene = replace(dented(-0.012), length=3.0, sag=lambda s: 0.015 * np.sin(np.pi * s / 3))
-    found = {d.kind: d for d in find(scene.scan(rng)).deformations}
-    assert set(found) == {DeformationKind.DENT, DeformationKind.BOW}
-    assert found[DeformationKind.DENT].depth == pytest.approx(0.012, rel=0.25)
+    depths = []
+    for _ in range(5):
+        found = {d.kind: d for d in find(scene.scan(rng)).deformations}
+        assert set(found) == {DeformationKind.DENT, DeformationKind.BOW}
+        depths.append(found[DeformationKind.DENT].depth)
+    assert np.median(depths) == pytest.approx(0.012, rel=0.25)
 
 
 @pytest.mark.parametrize("form", [{"bend_radius": 0.6}, {"radius_end": 0.08}], ids=["bend", "cone"])

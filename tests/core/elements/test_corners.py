@@ -38,8 +38,8 @@ def test_that_the_same_arc_without_planes_is_a_pipe(rng, radius):
     assert len(detect(cloud_of(arc)).elements) == 1
 
 
-def test_that_a_pipe_in_the_corner_of_floor_and_wall_is_a_pipe(rng):
-    """It touches both planes where nobody sees it, and they go on behind it."""
+def pipe_in_corner(rng):
+    """A pipe that touches floor and wall where nobody sees it, with both; its radius beside."""
     along, across, up = random_rotation(rng)
     radius, start = rng.uniform(0.05, 0.1), rng.uniform(-1, 1, 3)
     axis = LineAxis(start, along, LENGTH)
@@ -52,15 +52,23 @@ def test_that_a_pipe_in_the_corner_of_floor_and_wall_is_a_pipe(rng):
         is_seen = np.abs((xyz - start) @ (across - up)) > np.sqrt(2) * radius
         return xyz[is_seen], normals[is_seen]
 
-    result = detect(
-        cloud_of(
-            tube(
-                rng, axis, radius, spacing=SPACING, noise=NOISE, arc=np.deg2rad(170),
-                middle_clock=middle,
-            ),
-            visible(*plane(rng, corner, LENGTH * along, 0.8 * across, SPACING, NOISE)),
-            visible(*plane(rng, corner, LENGTH * along, 0.8 * up, SPACING, NOISE)),
-        )
+    cloud = cloud_of(
+        tube(
+            rng, axis, radius, spacing=SPACING, noise=NOISE, arc=np.deg2rad(170),
+            middle_clock=middle,
+        ),
+        visible(*plane(rng, corner, LENGTH * along, 0.8 * across, SPACING, NOISE)),
+        visible(*plane(rng, corner, LENGTH * along, 0.8 * up, SPACING, NOISE)),
     )  # fmt: skip
-    # The strips of floor and wall beside it are as near as its own points: it comes out large.
-    assert [e.radius for e in result.elements] == pytest.approx([radius], rel=0.06)
+    return cloud, radius
+
+
+def test_that_pipes_in_the_corner_of_floor_and_wall_are_pipes(rng):
+    n_scenes, n_right = 12, 0
+    for _ in range(n_scenes):
+        cloud, radius = pipe_in_corner(rng)
+        # The strips of floor and wall beside it are as near as its own points: it is large.
+        radii = [e.radius for e in detect(cloud).elements]
+        n_right += radii == pytest.approx([radius], rel=0.06)
+    # One in twenty attitudes is missed: fewer than 8 of 12 come once in ten thousand seeds.
+    assert n_right >= 8

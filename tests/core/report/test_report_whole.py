@@ -14,7 +14,7 @@ import pipecore.report
 import pipecore.report.html
 from pipecore.errors import CancelledError, SettingsError, WriteError
 from pipecore.report import by_verdict, result_to_dict, summarise, write_html, write_report
-from pipecore.report.figures import broken_at_gaps
+from pipecore.report.figures import broken_at_gaps, section_around
 from pipecore.settings import Settings
 from pipecore.types import NO_ID, DeformationKind, Profiles, Verdict
 from tests.factories import make_scan
@@ -302,6 +302,16 @@ def test_that_a_line_is_not_drawn_where_profiles_are_missing():
     assert np.isnan(x).tolist() == np.isnan(y).tolist() == [False] * 3 + [True] + [False] * 3
     x, y = broken_at_gaps(chainage[:3], np.arange(3.0))
     assert np.isfinite([x, y]).all()
+
+
+def test_that_the_section_of_an_oval_pipe_is_oval(rng):
+    """Though its points deviate by nothing from the section's own curve."""
+    ovality = make_scan()[1].deformations[0]
+    chainage = ovality.chainage + rng.uniform(-0.005, 0.005, 20_000)
+    clock = rng.uniform(0, 2 * np.pi, 20_000)
+    height = 0.005 * np.cos(2 * clock)
+    angle, mean = section_around(ovality, (chainage, clock, 0 * clock, height))
+    assert mean == pytest.approx(0.005 * np.cos(2 * angle), abs=3e-4)
 
 
 def test_that_nothing_found_is_a_report_too(tmp_path):
