@@ -47,21 +47,27 @@ def common_axis(normals, chosen):
 
 
 @njit(cache=True, nogil=True)
-def look_along(uv, normals, au, av, ad, x, y, mx, my):
-    """Write points and normals as seen along the axis (au, av, ad).
+def along(u, v, nu, nv, nd, tu, tv, ad, sin):
+    """A point and its normal as seen along an axis tilted by `sin` towards (tu, tv).
 
-    x runs across the axis's tilt, y along it, foreshortened. Returns (tu, tv), the
-    direction of the tilt in the profile's plane.
+    x runs across the tilt, y along it, foreshortened by `ad`.
+    """
+    x, y = tu * v - tv * u, (tu * u + tv * v) * ad
+    return x, y, tu * nv - tv * nu, (tu * nu + tv * nv) * ad - nd * sin
+
+
+@njit(cache=True, nogil=True)
+def look_along(uv, normals, au, av, ad, x, y, mx, my):
+    """Write points and normals as seen along the axis (au, av, ad); see `along`.
+
+    Returns (tu, tv), the direction of the tilt in the profile's plane.
     """
     sin = math.sqrt(au * au + av * av)
     tu, tv = (au / sin, av / sin) if sin > 1e-9 else (1.0, 0.0)
     for i in range(uv.shape[0]):
-        u, v = uv[i, 0], uv[i, 1]
-        x[i] = tu * v - tv * u
-        y[i] = (tu * u + tv * v) * ad
-        nu, nv, nd = normals[i, 0], normals[i, 1], normals[i, 2]
-        mx[i] = tu * nv - tv * nu
-        my[i] = (tu * nu + tv * nv) * ad - nd * sin
+        x[i], y[i], mx[i], my[i] = along(
+            uv[i, 0], uv[i, 1], normals[i, 0], normals[i, 1], normals[i, 2], tu, tv, ad, sin
+        )
     return tu, tv
 
 
@@ -80,33 +86,32 @@ def next_random(state):
 
 
 @njit(cache=True, nogil=True)
-def pick_pair(normals, free, state):
-    """Two free points whose normals differ clearly: state, indices, or -1 if luck fails.
+def drawn(state, n):
+    """Return a number below `n` from a random state."""
+    return np.int64(((state >> np.uint64(33)) * np.uint64(n)) >> np.uint64(31))
+
+
+@njit(cache=True, nogil=True)
+def pick_pair(nus, nvs, nds, state):
+    """Two points whose normals differ clearly: state, indices, or -1 if luck fails.
 
     The points of a curve are listed row by row, so neighbours in the list lie near each
     other. The second point is drawn from a stretch around the first, of a length drawn
     from halvings of the curve: where it holds many pipes, far points seldom share one.
     """
-    n = normals.shape[0]
+    n = nus.shape[0]
     n_halvings = 1
     while n >> n_halvings > 3:
         n_halvings += 1
     for _ in range(12):
         state = next_random(state)
-        reach = n >> np.int64((state >> np.uint64(33)) % np.uint64(n_halvings))
+        reach = n >> drawn(state, n_halvings)
         state = next_random(state)
-        i = np.int64((state >> np.uint64(33)) % np.uint64(n))
+        i = drawn(state, n)
         state = next_random(state)
         low, high = max(0, i - reach), min(n, i + reach + 1)
-        j = low + np.int64((state >> np.uint64(33)) % np.uint64(high - low))
-        if not free[i] or not free[j]:
-            continue
-        cos = (
-            normals[i, 0] * normals[j, 0]
-            + normals[i, 1] * normals[j, 1]
-            + normals[i, 2] * normals[j, 2]
-        )
-        if abs(cos) < MIN_PAIR_COS:
+        j = low + drawn(state, high - low)
+        if abs(nus[i] * nus[j] + nvs[i] * nvs[j] + nds[i] * nds[j]) < MIN_PAIR_COS:
             return state, i, j
     return state, -1, -1
 
@@ -117,23 +122,27 @@ def turn_on_circle(us, vs, nus, nvs, nds, tu, tv, ad, sin, cx, cy, r, slack, cos
 
     Points count as far as their normals turn: a floor would lie on any large circle. Seen
     along an axis as `look_along` does, tilted by `sin` towards (tu, tv); added up in lanes
-    side by side.
+    side by side, in single precision, without roots or divisions.
     """
-    count = cos2 = sin2 = 0.0
+    one, zero = np.float32(1.0), np.float32(0.0)
+    xu, xv, yu, yv = np.float32(-tv), np.float32(tu), np.float32(tu * ad), np.float32(tv * ad)
+    x0, y0, lean = np.float32(cx), np.float32(cy), np.float32(sin)
+    least, most = np.float32(max(r - slack, 0.0) ** 2), np.float32((r + slack) ** 2)
+    radial = np.float32(cos_radial**2)
+    count = cos2 = sin2 = zero
     for k in range(us.shape[0]):
-        dx = tu * vs[k] - tv * us[k] - cx
-        dy = (tu * us[k] + tv * vs[k]) * ad - cy
-        mx = tu * nvs[k] - tv * nus[k]
-        my = (tu * nus[k] + tv * nvs[k]) * ad - nds[k] * sin
+        dx = xu * us[k] + xv * vs[k] - x0
+        dy = yu * us[k] + yv * vs[k] - y0
+        mx = xu * nus[k] + xv * nvs[k]
+        my = yu * nus[k] + yv * nvs[k] - nds[k] * lean
         d2 = dx * dx + dy * dy
-        d = math.sqrt(d2)
-        is_on = (abs(d - r) <= slack) & (abs(dx * mx + dy * my) >= cos_radial * d)
-        w = 1.0 if is_on else 0.0
-        share = w / max(d2, 1e-300)
+        facing = dx * mx + dy * my
+        is_on = (d2 >= least) & (d2 <= most) & (facing * facing >= radial * d2)
+        w = one if is_on else zero
         count += w
-        cos2 += share * (dx * dx - dy * dy)
-        sin2 += share * (2.0 * dx * dy)
-    return count - math.sqrt(cos2 * cos2 + sin2 * sin2)
+        cos2 += w * (dx * dx - dy * dy)
+        sin2 += w * (dx * dy)
+    return count - math.sqrt(cos2 * cos2 + np.float32(4.0) * sin2 * sin2) / (r * r)
 
 
 @njit(cache=True, nogil=True)
@@ -146,58 +155,55 @@ def best_circle(
     along it, a centre (where the normals meet). Writes the inliers, returns their number.
     """
     n = uv.shape[0]
-    # The free points side by side, for the many trials.
-    table, n_free = np.empty((5, n)), 0
+    # The free points side by side, for the many trials; near zero, for single precision.
+    table, n_free = np.empty((5, n), np.float32), 0
+    u0, v0 = uv[0, 0], uv[0, 1]
     for k in range(n):
         if free[k]:
-            table[0, n_free], table[1, n_free] = uv[k, 0], uv[k, 1]
+            table[0, n_free], table[1, n_free] = uv[k, 0] - u0, uv[k, 1] - v0
             table[2, n_free], table[3, n_free] = normals[k, 0], normals[k, 1]
             table[4, n_free] = normals[k, 2]
             n_free += 1
+    if n_free == 0:
+        return 0
     us, vs, nus, nvs, nds = (
         table[0, :n_free], table[1, :n_free], table[2, :n_free], table[3, :n_free],
         table[4, :n_free],
     )  # fmt: skip
-    pair_uv, pair_normals = np.empty((2, 2)), np.empty((2, 3))
-    px, py, pmx, pmy = np.empty(2), np.empty(2), np.empty(2), np.empty(2)
     best_turn = 0.0
     best_au = best_av = best_ad = best_cx = best_cy = best_r = 0.0
     state = np.uint64(seed) * np.uint64(2862933555777941757) + np.uint64(3037000493)
     for _ in range(n_trials):
-        state, i, j = pick_pair(normals, free, state)
+        state, i, j = pick_pair(nus, nvs, nds, state)
         if i < 0:
             continue
-        au = normals[i, 1] * normals[j, 2] - normals[i, 2] * normals[j, 1]
-        av = normals[i, 2] * normals[j, 0] - normals[i, 0] * normals[j, 2]
-        ad = normals[i, 0] * normals[j, 1] - normals[i, 1] * normals[j, 0]
+        au = nvs[i] * nds[j] - nds[i] * nvs[j]
+        av = nds[i] * nus[j] - nus[i] * nds[j]
+        ad = nus[i] * nvs[j] - nvs[i] * nus[j]
         length = math.sqrt(au * au + av * av + ad * ad)
         if ad < 0.0:
             length = -length
         au, av, ad = au / length, av / length, ad / length
         if ad < min_cos_tilt:
             continue
-        for m in range(2):
-            k = i if m == 0 else j
-            pair_uv[m, 0], pair_uv[m, 1] = uv[k, 0], uv[k, 1]
-            for axis in range(3):
-                pair_normals[m, axis] = normals[k, axis]
-        tu, tv = look_along(pair_uv, pair_normals, au, av, ad, px, py, pmx, pmy)
-        sin = pmx[0] * pmy[1] - pmy[0] * pmx[1]
+        tilt = math.sqrt(au * au + av * av)
+        tu, tv = (au / tilt, av / tilt) if tilt > 1e-9 else (1.0, 0.0)
+        xi, yi, mxi, myi = along(us[i], vs[i], nus[i], nvs[i], nds[i], tu, tv, ad, tilt)
+        xj, yj, mxj, myj = along(us[j], vs[j], nus[j], nvs[j], nds[j], tu, tv, ad, tilt)
+        sin = mxi * myj - myi * mxj
         if abs(sin) < 0.2:
             continue
-        t = ((px[1] - px[0]) * pmy[1] - (py[1] - py[0]) * pmx[1]) / sin
-        cx, cy = px[0] + t * pmx[0], py[0] + t * pmy[0]
-        r1, r2 = abs(t), math.sqrt((px[1] - cx) ** 2 + (py[1] - cy) ** 2)
+        t = ((xj - xi) * myj - (yj - yi) * mxj) / sin
+        cx, cy = xi + t * mxi, yi + t * myi
+        r1, r2 = abs(t), math.sqrt((xj - cx) ** 2 + (yj - cy) ** 2)
         r = 0.5 * (r1 + r2)
         if abs(r1 - r2) > 0.25 * r or r > max_radius or r < tolerance:
             continue
         slack = tolerance + min(0.05 * r, 2.0 * tolerance)
-        turn = turn_on_circle(
-            us, vs, nus, nvs, nds, tu, tv, ad, math.sqrt(au * au + av * av), cx, cy, r,
-            slack, cos_radial,
-        )  # fmt: skip
+        turn = turn_on_circle(us, vs, nus, nvs, nds, tu, tv, ad, tilt, cx, cy, r, slack, cos_radial)
         if turn > best_turn:
-            best_turn, best_cx, best_cy, best_r = turn, cx, cy, r
+            best_turn, best_r = turn, r
+            best_cx, best_cy = cx + tu * v0 - tv * u0, cy + (tu * u0 + tv * v0) * ad
             best_au, best_av, best_ad = au, av, ad
     if best_turn == 0.0:
         return 0

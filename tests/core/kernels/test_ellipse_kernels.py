@@ -179,7 +179,7 @@ def test_that_a_flat_curve_has_no_pair_that_tells_an_axis(rng, spread_deg):
     assert is_flat == (spread_deg < 8.0) or spread_deg == 9.9
     if is_flat:
         assert cos.min() >= kernels.MIN_PAIR_COS
-    _, i, j = kernels.pick_pair(normals, free, np.uint64(7))
+    _, i, j = kernels.pick_pair(*normals[free].T.copy(), np.uint64(7))
     assert not is_flat or (i, j) == (-1, -1)
 
 
@@ -199,6 +199,8 @@ def test_that_the_turn_on_a_circle_counts_points_that_lie_on_it_and_face_its_cen
     theta = np.arctan2(y - cy, x - cx)[is_on]
     expected = len(theta) - abs(np.exp(2j * theta).sum())
     turn = kernels.turn_on_circle(
-        *uv.T.copy(), *normals.T.copy(), tu, tv, axis[2], np.hypot(*axis[:2]), cx, cy, r, 0.004, 0.9
-    )
-    assert turn == pytest.approx(expected)
+        *(column.astype(np.float32) for column in (*uv.T, *normals.T)),
+        tu, tv, axis[2], np.hypot(*axis[:2]), cx, cy, r, 0.004, 0.9,
+    )  # fmt: skip
+    # Each point's share is that of one on the circle itself.
+    assert turn == pytest.approx(expected, abs=0.05 * len(theta))
