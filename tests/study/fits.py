@@ -72,7 +72,7 @@ def _errors(arc_deg: int, n: int) -> dict[str, Any]:
 
     flat, starts = points.reshape(-1, 2), np.arange(0, (n + 1) * N_POINTS, N_POINTS)
     fits = np.empty((n, N_FIT_COLUMNS))
-    fit_curves(flat, normals.reshape(-1, 3), starts, 0, n, 3 * SIGMA, 0.04, fits)
+    fit_curves(flat, normals.reshape(-1, 3), starts, 0, n, 3 * SIGMA, 0.04, 0.0, np.inf, fits)
     free = [fit_nonlinear_ellipse(p, max_sd_share=np.inf) for p in points]
     robust = [fit_nonlinear_ellipse(p, robust=True, max_sd_share=np.inf) for p in points]
     gated = [fit_nonlinear_ellipse(p) for p in points]

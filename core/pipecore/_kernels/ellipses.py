@@ -348,9 +348,13 @@ share of radial normals; where the normals meet u, v, d, and the points' distanc
 
 
 @njit(cache=True, nogil=True)
-def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits):
+def fit_curves(
+    uv, normals, curve_starts, start, stop, tolerance, max_gap, min_cos_tilt, max_off_axis, fits
+):
     """Fit a cylinder cut to each of the curves start … stop; write `N_FIT_COLUMNS` values.
 
+    They are nan where the curve is none: also where the axis is tilted too much (cosine below
+    `min_cos_tilt`), or hardly defined (λ1 above `max_off_axis` λ2).
     Where the normals meet is the centre of the section on a cylinder, and the centre of
     the sphere on a sphere, wherever it was cut.
     """
@@ -365,7 +369,8 @@ def fit_curves(uv, normals, curve_starts, start, stop, tolerance, max_gap, fits)
         x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
         weights = np.ones(n)
         au, av, ad, l1, l2 = common_axis(vectors, chosen)
-        if math.isnan(ad):
+        # Also where they are nan.
+        if not (ad >= min_cos_tilt and l1 <= max_off_axis * l2):
             continue
         tu, tv = look_along(points, vectors, au, av, ad, x, y, mx, my)
         cx, cy, r = taubin_circle(x, y, weights)

@@ -42,6 +42,44 @@ def take_off(terms, values):
 
 
 @njit(cache=True, nogil=True)
+def look_at_sphere(xyz, chosen, centre, radius, n_sectors, n_around, n_high, least):
+    """How far chosen points leave a sphere, how high they reach over its centre, and their arc.
+
+    The misfit is the root mean square of the medians of patches of equal area: even steps of
+    height and of azimuth. Those of fewer than `least` points do not count; infinite where
+    none does. The arc is that of the sectors about the vertical that hold points.
+
+    Returns
+    -------
+    misfit, low, high, arc : float
+    """
+    n = chosen.shape[0]
+    patch, residual = np.empty(n, np.int64), np.empty(n)
+    seen = np.zeros(n_sectors, np.bool_)
+    low, high = math.inf, -math.inf
+    for m in range(n):
+        i = chosen[m]
+        x, y, z = xyz[i, 0] - centre[0], xyz[i, 1] - centre[1], xyz[i, 2] - centre[2]
+        rho = math.sqrt(x * x + y * y + z * z)
+        residual[m] = rho - radius
+        low, high = min(low, z), max(high, z)
+        turn = math.atan2(y, x) / (2.0 * math.pi) + 0.5
+        step = int((z / rho + 1.0) * 0.5 * n_high)
+        patch[m] = min(int(turn * n_around), n_around - 1) * n_high + min(step, n_high - 1)
+        seen[min(int(turn * n_sectors), n_sectors - 1)] = True
+    members, starts = group_by_label(patch, n_around * n_high)
+    total, n_used = 0.0, 0
+    for k in range(n_around * n_high):
+        a, b = starts[k], starts[k + 1]
+        if b - a >= least:
+            middle = (b - a) // 2
+            total += np.partition(residual[members[a:b]], middle)[middle] ** 2
+            n_used += 1
+    misfit = math.sqrt(total / n_used) if n_used > 0 else math.inf
+    return misfit, low, high, 2.0 * math.pi * seen.sum() / n_sectors
+
+
+@njit(cache=True, nogil=True)
 def section_misfit(clock, residual, n_sectors, least, least_share, n_harmonics):
     """How far the medians of sectors leave a circle (one harmonic) or an oval (two).
 

@@ -5,7 +5,11 @@ import math
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.eigen import eigenvalues, eigenvector
 from pipecore._kernels.ellipses import next_random
+
+N_LINE_COLUMNS = 10
+"""Columns of a line: middle x, y, z; direction x, y, z; radius there, slope; low, high."""
 
 
 @njit(cache=True, nogil=True)
@@ -146,6 +150,169 @@ def best_line(
             max_change,
         )
     return best
+
+
+@njit(cache=True, nogil=True)
+def weight_of(sd, k):
+    """Weight of an ellipse by how well its radius is known."""
+    return 1.0 / (sd[k] ** 2 + 1e-8)
+
+
+@njit(cache=True, nogil=True)
+def weighted_median(values, weights):
+    """The value below which half of the weights are."""
+    order = np.argsort(values)
+    below, half = 0.0, 0.5 * weights.sum()
+    for k in order:
+        below += weights[k]
+        if below >= half:
+            return values[k]
+    return values[order[-1]]
+
+
+@njit(cache=True, nogil=True)
+def fit_line(centre, radius, sd, chosen, is_tapered, line, along):
+    """Fit a line to the chosen centres, weighted by their precision, and its radius.
+
+    Writes the first eight columns of the line, and each chosen one's chainage from its middle.
+    """
+    n = chosen.shape[0]
+    weights, total, mx, my, mz = np.empty(n), 0.0, 0.0, 0.0, 0.0
+    for m in range(n):
+        k = chosen[m]
+        w = weight_of(sd, k)
+        weights[m], total = w, total + w
+        mx, my, mz = mx + w * centre[k, 0], my + w * centre[k, 1], mz + w * centre[k, 2]
+    mx, my, mz = mx / total, my / total, mz / total
+    xx = xy = xz = yy = yz = zz = 0.0
+    for m in range(n):
+        k, w = chosen[m], weights[m] / total
+        x, y, z = centre[k, 0] - mx, centre[k, 1] - my, centre[k, 2] - mz
+        xx, xy, xz = xx + w * x * x, xy + w * x * y, xz + w * x * z
+        yy, yz, zz = yy + w * y * y, yz + w * y * z, zz + w * z * z
+    _, _, largest = eigenvalues(xx, xy, xz, yy, yz, zz)
+    dx, dy, dz = eigenvector(xx, xy, xz, yy, yz, zz, largest)
+    mean_s = mean_r = 0.0
+    radii = np.empty(n)
+    for m in range(n):
+        k = chosen[m]
+        x, y, z = centre[k, 0] - mx, centre[k, 1] - my, centre[k, 2] - mz
+        along[m], radii[m] = x * dx + y * dy + z * dz, radius[k]
+        mean_s, mean_r = mean_s + weights[m] * along[m], mean_r + weights[m] * radii[m]
+    line[0], line[1], line[2], line[3], line[4], line[5] = mx, my, mz, dx, dy, dz
+    if not is_tapered:
+        line[6], line[7] = weighted_median(radii, weights), 0.0
+        return
+    mean_s, mean_r = mean_s / total, mean_r / total
+    rise = run = 0.0
+    for m in range(n):
+        s = along[m] - mean_s
+        rise, run = rise + weights[m] * s * (radii[m] - mean_r), run + weights[m] * s * s
+    line[6], line[7] = mean_r - rise / run * mean_s, rise / run
+
+
+@njit(cache=True, nogil=True)
+def taper_of(radius, sd, chosen, along):
+    """Change of the radius along an axis, and its standard deviation."""
+    n = chosen.shape[0]
+    total = mean_s = mean_r = 0.0
+    for m in range(n):
+        w = weight_of(sd, chosen[m])
+        total, mean_s, mean_r = total + w, mean_s + w * along[m], mean_r + w * radius[chosen[m]]
+    mean_s, mean_r = mean_s / total, mean_r / total
+    rise = run = square = 0.0
+    for m in range(n):
+        w, s, r = weight_of(sd, chosen[m]), along[m] - mean_s, radius[chosen[m]] - mean_r
+        rise, run, square = rise + w * s * r, run + w * s * s, square + w * r * r
+    taper = rise / run
+    left = max(square - taper * rise, 0.0)
+    return taper, math.sqrt(left / max(n - 2, 1) / run)
+
+
+@njit(cache=True, nogil=True)
+def longest_part(along, max_gap):
+    """Places of the part with most entries that has no gap longer than `max_gap`, in order."""
+    order = np.argsort(along)
+    first = best_first = best_last = 0
+    for k in range(1, order.shape[0] + 1):
+        if k == order.shape[0] or along[order[k]] - along[order[k - 1]] > max_gap:
+            if k - first > best_last - best_first:
+                best_first, best_last = first, k
+            first = k
+    return order[best_first:best_last]
+
+
+@njit(cache=True, nogil=True)
+def take_lines(
+    centre, axis, radius, sd, n_trials, is_tapered, limits, width, min_length, min_ellipses, piece
+):  # fmt: skip
+    """Take straight pieces off the ellipses, best first.
+
+    Parameters
+    ----------
+    centre, axis, radius, sd : ndarray
+        Of the ellipses.
+    n_trials : int
+    is_tapered : bool
+        Whether the radius changes along the pieces.
+    limits : tuple of float
+        Least cosine between axes, and by which shares of the radius centres may be off, the
+        radius of a pair, and that of a piece; least taper.
+    width, min_length : float
+        Usual width of the profiles, and the least length in radii.
+    min_ellipses : int
+    piece : ndarray of int32
+        Filled with the number of each ellipse's piece, -1 for none.
+
+    Returns
+    -------
+    ndarray, shape (k, N_LINE_COLUMNS)
+    """
+    min_cos, max_offset, max_change, same_radius, min_taper = limits
+    n = centre.shape[0]
+    free, inliers = np.ones(n, np.bool_), np.empty(n, np.bool_)
+    lines = np.empty((n // min_ellipses + 1, N_LINE_COLUMNS))
+    piece[:] = -1
+    n_free, n_found, n_failed = n, 0, 0
+    while n_free >= min_ellipses and n_failed < 3:
+        count = best_line(
+            centre, axis, radius, sd, free, n_trials, is_tapered, min_cos, max_offset, max_change,
+            inliers,
+        )  # fmt: skip
+        if count < min_ellipses:
+            break
+        drawn = np.flatnonzero(inliers)
+        line, along = lines[n_found], np.empty(count)
+        fit_line(centre, radius, sd, drawn, is_tapered, line, along)
+        # The pair's radius was rough: what is off the piece's own pattern stays free.
+        chosen, n_fit = np.empty(count, np.int64), 0
+        for m in range(count):
+            k, expected = drawn[m], line[6] + line[7] * along[m]
+            if abs(radius[k] - expected) < same_radius * expected + 2.0 * sd[k]:
+                chosen[n_fit], along[n_fit] = k, along[m]
+                n_fit += 1
+        chosen, along = chosen[:n_fit], along[:n_fit]
+        length = 0.0
+        if n_fit >= min_ellipses:
+            part = longest_part(along, max(8.0 * width, 3.0 * line[6]))
+            length = along[part[-1]] - along[part[0]]
+            chosen, along = np.sort(chosen[part]), along[part]
+        given_up = chosen if n_fit > 0 else drawn
+        for k in given_up:
+            free[k] = False
+        n_free -= given_up.shape[0]
+        if chosen.shape[0] < min_ellipses or length < max(min_length * line[6], 2.5 * width):
+            n_failed += 1
+            continue
+        fit_line(centre, radius, sd, chosen, is_tapered, line, along)
+        taper, taper_sd = taper_of(radius, sd, chosen, along)
+        if is_tapered != (abs(taper) > max(min_taper, 6.0 * taper_sd)):
+            continue
+        line[8], line[9] = along.min() - 0.5 * width, along.max() + 0.5 * width
+        for k in chosen:
+            piece[k] = n_found
+        n_found += 1
+    return lines[:n_found]
 
 
 @njit(cache=True, nogil=True)

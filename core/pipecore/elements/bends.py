@@ -6,8 +6,9 @@ at an angle leave one unknown: the rounder the corner, the earlier the bend begi
 before it must agree with the straights and points in it with the torus, for one bend radius.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,9 @@ from pipecore.elements.surfaces import (
     fit_surface,
     robust_sigma,
 )
-from pipecore.geometry import ArcAxis
+from pipecore.geometry import ArcAxis, cross, unit
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress, Progress
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -42,6 +45,8 @@ N_STEPS = 6
 """Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
 MIN_POINTS, LEAST_ON_BEND = 15, 12
 """Points that a bend is fitted to, and those for which one is tried."""
+PAIRS_AT_ONCE = 200
+"""Pairs of ends that one thread looks at; of most a glance tells that they do not meet."""
 MAX_POINTS = 20_000
 FREE_SD = 0.015
 """A bend whose own points carry its bend radius to this share needs no straights for it."""
@@ -70,56 +75,73 @@ class Corner:
     radius: float
     sd: float = 0.0
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """Unit normal of the plane of both axes, about which the bend turns."""
-        normal = np.cross(self.towards[0], -self.towards[1])
-        return np.asarray(normal / np.linalg.norm(normal))
+        return unit(cross(self.towards[0], -self.towards[1]))
+
+    @cached_property
+    def inward(self) -> Array:
+        """Unit vector across the first straight, to the side to which the bend turns."""
+        return cross(self.normal, self.towards[0])
 
     @property
     def half_tangent(self) -> float:
         """Distance from the corner to where the bend begins, in bend radii."""
         return float(np.tan(self.turn / 2))
 
+    def centre(self, bend_radius: float) -> Array:
+        """The point about which the bend of a bend radius turns."""
+        begin = self.place - bend_radius * self.half_tangent * self.towards[0]
+        return np.asarray(begin + bend_radius * self.inward)
+
     def surface(self, bend_radius: float, radius: float) -> ArcSurface:
         """The bend of a bend radius."""
-        inward = np.cross(self.normal, self.towards[0])
-        begin = self.place - bend_radius * self.half_tangent * self.towards[0]
-        return ArcSurface(begin + bend_radius * inward, self.normal, bend_radius, radius)
+        return ArcSurface(self.centre(bend_radius), self.normal, bend_radius, radius)
 
     def axis(self, bend_radius: float) -> ArcAxis:
         """Its axis from one straight to the other."""
-        inward = np.cross(self.normal, self.towards[0])
-        begin = self.place - bend_radius * self.half_tangent * self.towards[0]
-        return ArcAxis(begin + bend_radius * inward, self.normal, -inward, bend_radius, self.turn)
+        return ArcAxis(self.centre(bend_radius), self.normal, -self.inward, bend_radius, self.turn)
 
 
 def find_corners(
-    fitted: list[Fitted], nearby: NearbyPoints, check: Callable[[], None] = lambda: None
-) -> Iterator[tuple[Corner, float, tuple[End, End]]]:
+    fitted: list[Fitted],
+    nearby: NearbyPoints,
+    progress: Progress = NoProgress(),
+    span: tuple[float, float] = (0.0, 1.0),
+) -> list[tuple[Corner, float, tuple[End, End]]]:
     """Find pairs of straight ends that a bend may join, those with most points on it first.
 
     Parameters
     ----------
     fitted : list of Fitted
     nearby : NearbyPoints
-    check : callable
-        Called now and then; may raise to cancel.
+    progress : Progress
+    span : (float, float)
+        Which part of the stage "elements" this is.
 
-    Yields
-    ------
-    tuple of Corner, float, (End, End)
+    Returns
+    -------
+    list of (Corner, float, (End, End))
         With the bend radius, of those tried, that most points agree with.
     """
     ends = straight_ends(fitted)
-    found = []
-    for a, b in _may_meet(ends):
-        check()
-        between = corner_between(fitted, ends[a], ends[b], nearby)
-        if between is not None:
-            found.append((*between, (ends[a].which, ends[b].which)))
-    for _, corner, bend_radius, pair in sorted(found, key=lambda x: (-x[0], x[3])):
-        yield corner, bend_radius, pair
+    pairs = list(_may_meet(ends))
+    between: list[tuple[int, Corner, float] | None] = [None] * len(pairs)
+
+    def look(first: int, last: int) -> None:
+        for k in range(first, last):
+            one, other = (ends[i] for i in pairs[k])
+            between[k] = corner_between(fitted, one, other, nearby)
+
+    for_chunks(look, len(pairs), PAIRS_AT_ONCE, "elements", progress, span)
+    found = [
+        (*corner, (ends[a].which, ends[b].which))
+        for corner, (a, b) in zip(between, pairs, strict=True)
+        if corner is not None
+    ]
+    found.sort(key=lambda x: (-x[0], x[3]))
+    return [(corner, bend_radius, pair) for _, corner, bend_radius, pair in found]
 
 
 def _may_meet(ends: list[StraightEnd]) -> Iterator[tuple[int, int]]:
@@ -199,13 +221,21 @@ def _best_bend_radius(corner: Corner, gap: float, nearby: NearbyPoints) -> tuple
     counts = np.empty((len(tried), 2), np.int64)
     kernels.agreement(
         xyz, normals,
-        np.stack([corner.surface(b, radius).numbers() for b in map(float, tried)]),
+        _surfaces(corner, tried, radius),
         np.stack([LineSurface(corner.place, t, radius).numbers() for t in corner.towards]),
         tried * corner.half_tangent, tolerance, RADIAL_COS, counts,
     )  # fmt: skip
     counts = np.where(counts[:, 1] >= LEAST_ON_BEND, counts[:, 0], -1)
     best = int(np.argmax(counts))
     return None if counts[best] < 0 else (int(counts[best]), float(tried[best]))
+
+
+def _surfaces(corner: Corner, bend_radii: Array, radius: float) -> Array:
+    """The bends of several bend radii as the kernels take them, shape (k, 14)."""
+    numbers = np.tile(corner.surface(1.0, radius).numbers(), (len(bend_radii), 1))
+    numbers[:, :3] = [corner.centre(b) for b in bend_radii]
+    numbers[:, 13] = bend_radii
+    return numbers
 
 
 def pipe_residuals(
@@ -228,8 +258,7 @@ def pipe_residuals(
     second = before[1] & ~first
     residual, jacobian, outward = corner.surface(bend_radius, radius).residuals(xyz)
     # The centre moves away from the corner as the bend radius grows.
-    inward = np.cross(corner.normal, corner.towards[0])
-    shift = inward - corner.half_tangent * corner.towards[0]
+    shift = corner.inward - corner.half_tangent * corner.towards[0]
     by_bend_radius = jacobian[:, :3] @ shift + jacobian[:, 5]
     for is_there, towards in ((first, corner.towards[0]), (second, corner.towards[1])):
         line = LineSurface(corner.place, towards, corner.radius)

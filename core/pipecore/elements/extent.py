@@ -146,24 +146,6 @@ def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int
     return turning
 
 
-def _median_by_row(values: Array, row: NDArray[np.intp], n_rows: int) -> Array:
-    """Median of the values of each row; infinite where there are none."""
-    medians = np.empty(n_rows)
-    kernels.upper_medians(values, row, medians)
-    return medians
-
-
-def sphere_misfit(outward: Array, residual: Array) -> float:
-    """How far a surface leaves a sphere, root mean square of the medians of its patches."""
-    azimuth = np.mod(np.arctan2(outward[:, 1], outward[:, 0]), 2 * np.pi)
-    # Patches of equal area: even steps of height and of azimuth.
-    patch = (azimuth / (2 * np.pi) * 12).astype(np.intp) % 12
-    patch = patch * 8 + np.clip((outward[:, 2] + 1.0) * 4, 0, 7).astype(np.intp)
-    median = _median_by_row(residual, patch, 96)
-    used = np.bincount(patch, minlength=96) >= 5
-    return float(np.sqrt(np.mean(median[used] ** 2))) if used.any() else np.inf
-
-
 def section_misfit(clock: Array, residual: Array, arc: float) -> float:
     """How far the mean section leaves the shapes that a pipe has, root mean square in metres.
 

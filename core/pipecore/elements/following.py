@@ -16,7 +16,7 @@ from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_angles
 from pipecore.elements.refine import RADIAL_COS
 from pipecore.elements.surfaces import ArcSurface, LineSurface
-from pipecore.geometry import unit
+from pipecore.geometry import cross, unit
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -102,8 +102,8 @@ def follow_end(
         The bend, and the straight beyond it if points show one.
     """
     radius, origin, ahead = end.radius, end.point, end.outward
-    side = unit(np.cross(np.eye(3)[np.argmin(np.abs(ahead))], ahead))
-    frame = np.stack([ahead, side, np.cross(ahead, side)])
+    side = unit(cross(np.eye(3)[np.argmin(np.abs(ahead))], ahead))
+    frame = np.stack([ahead, side, cross(ahead, side)])
     reach = np.hypot(AHEAD, ASIDE) * radius
     ball = nearby.within_ball(origin, reach)
     ball = ball[is_free[ball] & np.isfinite(nearby.surface.normals[ball, 0])]
@@ -135,7 +135,7 @@ def follow_end(
     begin = origin + start * radius * ahead
     bend = ArcSurface(
         begin + bend_radius * radius * inward,
-        np.cross(-inward, ahead),
+        cross(-inward, ahead),
         float(bend_radius * radius),
         radius,
     )
@@ -153,22 +153,19 @@ def _straight_beyond(
     is_free: Flags,
 ) -> Piece | None:
     """The straight, of those that leave a bend at some angle, that most points are on."""
-    radius = bend.radius
+    radius, half = bend.radius, 0.5 * BEYOND * bend.radius
     tolerance = max(3.0 * nearby.surface.noise, OFF * radius)
-    found = []
+    best, most = None, MIN_POINTS - 1
     for turn in np.arange(MIN_ANGLE, MAX_ANGLE, ANGLE_STEP):
         direction = np.cos(turn) * ahead + np.sin(turn) * inward
         out = np.sin(turn) * ahead - np.cos(turn) * inward
-        middle = bend.centre + bend.bend_radius * out + 0.5 * BEYOND * radius * direction
-        ball = nearby.within_ball(middle, float(np.hypot(0.5 * BEYOND, 1.2)) * radius)
-        ball = ball[is_free[ball]]
-        model = LineSurface(middle, direction, radius)
-        xyz = nearby.surface.xyz[ball]
-        residual, _, outward = model.residuals(xyz)
-        cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[ball], outward))
-        on = (np.abs(residual) < tolerance) & (cosine > RADIAL_COS)
-        on &= np.abs((xyz - middle) @ direction) < 0.5 * BEYOND * radius
-        half = 0.5 * BEYOND * radius
-        found.append((int(on.sum()), Piece(model, NO_ELLIPSES, -half, half)))
-    count, piece = max(found, key=lambda f: f[0])
-    return piece if count >= MIN_POINTS else None
+        model = LineSurface(
+            bend.centre + bend.bend_radius * out + half * direction, direction, radius
+        )
+        on = nearby.on_surface(
+            model, model.axis_between(-half, half), 0.0, is_free,
+            band=tolerance, depth=radius, min_cos=RADIAL_COS,
+        )  # fmt: skip
+        if len(on.own) > most:
+            best, most = Piece(model, NO_ELLIPSES, -half, half), len(on.own)
+    return best

@@ -38,10 +38,7 @@ def refine_pieces(
     progress.update("elements", 0.65)
     joinable = list(keeper.fitted)
 
-    def check() -> None:
-        progress.update("elements", 0.66)
-
-    for corner, bend_radius, ends in find_corners(joinable, nearby, check):
+    for corner, bend_radius, ends in find_corners(joinable, nearby, progress, (0.65, 0.67)):
         progress.update("elements", 0.67)
         keeper.try_bend(corner, bend_radius, ends)
     for piece, ends in propose_reducers(joinable):

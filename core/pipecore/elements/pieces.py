@@ -17,7 +17,8 @@ from pipecore.axes import join_centres
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.ellipses import Ellipses
 from pipecore.geometry import cross, unit
-from pipecore.progress import Progress
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress, Progress
 
 Array = NDArray[np.float64]
 
@@ -40,6 +41,7 @@ MIN_TAPER = 0.04
 LONG_PIECE = 2.5
 """Straight pieces of this many radii come first: shorter ones may be part of a bend."""
 SHORT_PIECE = 0.5
+CHAINS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,46 +94,39 @@ def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
         Chain of each ellipse.
     progress : Progress
     """
-    pieces = find_spheres(ellipses)
     order = np.argsort(chain, kind="stable")
     rows = _Rows(
         ellipses.centre, ellipses.axis, ellipses.radius, ellipses.radius_sd, ellipses.width
     )
     chains = np.split(order, np.flatnonzero(np.diff(chain[order])) + 1)
-    for i, members in enumerate(chains):
-        progress.update("elements", 0.3 * i / max(len(chains), 1))
-        if len(members) < MIN_ELLIPSES:
-            continue
-        pieces += _explain_chain(ellipses, rows, members, progress)
-    return pieces
+    chains = [members for members in chains if len(members) >= MIN_ELLIPSES]
+    found: list[list[Piece]] = [[] for _ in chains]
+
+    def explain(first: int, last: int) -> None:
+        for i in range(first, last):
+            found[i] = _explain_chain(ellipses, rows, chains[i])
+
+    for_chunks(explain, len(chains), CHAINS_AT_ONCE, "elements", progress, (0.0, 0.3))
+    return [*find_spheres(ellipses), *(piece for pieces in found for piece in pieces)]
 
 
-def _explain_chain(
-    ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp], progress: Progress
-) -> list[Piece]:
-    pieces: list[Piece] = []
-
-    def take(found: list[Piece]) -> None:
-        nonlocal members
-        pieces.extend(found)
-        for piece in found:
+def _explain_chain(ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
+    pieces, members = _take_lines(rows, members, LONG_PIECE)
+    tapered, members = _take_lines(rows, members, SHORT_PIECE, is_tapered=True)
+    pieces += tapered
+    for group in _reconnected(ellipses, members):
+        arcs = _take_arcs(rows, group)
+        pieces += arcs
+        for piece in arcs:
             members = np.setdiff1d(members, piece.ellipses)
-
-    take(_take_lines(rows, members, LONG_PIECE))
-    take(_take_lines(rows, members, SHORT_PIECE, is_tapered=True))
-    for group in _reconnected(ellipses, members, progress):
-        take(_take_arcs(rows, group))
-    take(_take_lines(rows, members, SHORT_PIECE))
-    return pieces
+    return pieces + _take_lines(rows, members, SHORT_PIECE)[0]
 
 
-def _reconnected(
-    ellipses: Ellipses, members: NDArray[np.intp], progress: Progress
-) -> list[NDArray[np.intp]]:
+def _reconnected(ellipses: Ellipses, members: NDArray[np.intp]) -> list[NDArray[np.intp]]:
     """Groups of the members that still hang together."""
     if len(members) < MIN_ELLIPSES:
         return []
-    label = join_centres(ellipses[members], progress)
+    label = join_centres(ellipses[members], NoProgress())
     return [members[label == k] for k in range(label.max() + 1)]
 
 
@@ -140,89 +135,30 @@ def _take_lines(
     members: NDArray[np.intp],
     min_length: float,
     is_tapered: bool = False,
-) -> list[Piece]:
-    """Take straight pieces of at least `min_length` radii off the members, best first."""
+) -> tuple[list[Piece], NDArray[np.intp]]:
+    """Take straight pieces of at least `min_length` radii off the members, best first.
+
+    Returns them and the members that are left.
+    """
     if len(members) < MIN_ELLIPSES:
-        return []
+        return [], members
     e = rows[members]
-    width = float(np.median(e.width))
-    free = np.ones(len(members), np.bool_)
-    inliers = np.empty(len(members), np.bool_)
-    pieces: list[Piece] = []
-    n_failed = 0
-    while free.sum() >= MIN_ELLIPSES and n_failed < 3:
-        count = kernels.best_line(
-            e.centre, e.axis, e.radius, e.radius_sd, free, N_TRIALS, is_tapered,
-            MIN_COS, MAX_OFFSET, MAX_CHANGE, inliers,
-        )  # fmt: skip
-        if count < MIN_ELLIPSES:
-            break
-        chosen = np.flatnonzero(inliers)
-        model, along = _fit_line(e, chosen, is_tapered)
-        # The pair's radius was rough: what is off the piece's own pattern stays free.
-        expected = model.radius + model.slope * along
-        fits = (
-            np.abs(e.radius[chosen] - expected) < SAME_RADIUS * expected + 2 * e.radius_sd[chosen]
+    number = np.empty(len(members), np.int32)
+    lines = kernels.take_lines(
+        e.centre, e.axis, e.radius, e.radius_sd, N_TRIALS, is_tapered,
+        (MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER), float(np.median(e.width)),
+        min_length, MIN_ELLIPSES, number,
+    )  # fmt: skip
+    pieces = [
+        Piece(
+            LineSurface(line[:3].copy(), line[3:6].copy(), line[6], line[7], is_tapered),
+            members[number == k],
+            line[8],
+            line[9],
         )
-        chosen, along = chosen[fits], along[fits]
-        if len(chosen) >= MIN_ELLIPSES:
-            part = _longest_part(along, max(8 * width, 3 * model.radius))
-            chosen, along = chosen[part], along[part]
-        too_short = max(min_length * model.radius, 2.5 * width)
-        if len(chosen) < MIN_ELLIPSES or np.ptp(along) < too_short:
-            n_failed += 1
-            free[chosen if len(chosen) else inliers] = False
-            continue
-        free[chosen] = False
-        model, along = _fit_line(e, chosen, is_tapered)
-        taper, taper_sd = _taper(e, chosen, along)
-        if is_tapered != (abs(taper) > max(MIN_TAPER, 6 * taper_sd)):
-            continue
-        half = 0.5 * width
-        pieces.append(Piece(model, members[chosen], along.min() - half, along.max() + half))
-    return pieces
-
-
-def _taper(e: _Rows, chosen: NDArray[np.intp], along: Array) -> tuple[float, float]:
-    """Change of the radius along the axis, and its standard deviation."""
-    weight = 1.0 / (e.radius_sd[chosen] ** 2 + 1e-8)
-    s = along - (weight @ along) / weight.sum()
-    r = e.radius[chosen] - (weight @ e.radius[chosen]) / weight.sum()
-    spread = weight @ s**2
-    taper = (weight @ (s * r)) / spread
-    scatter = np.sqrt((weight @ (r - taper * s) ** 2) / max(len(chosen) - 2, 1) / spread)
-    return float(taper), float(scatter)
-
-
-def _fit_line(e: _Rows, chosen: NDArray[np.intp], is_tapered: bool) -> tuple[LineSurface, Array]:
-    """Line through the chosen centres, weighted by their precision; chainages from its middle."""
-    weight = 1.0 / (e.radius_sd[chosen] ** 2 + 1e-8)
-    weight /= weight.sum()
-    centres = e.centre[chosen]
-    middle = weight @ centres
-    centred = centres - middle
-    direction = np.linalg.eigh((weight[:, None] * centred).T @ centred)[1][:, -1]
-    along = centred @ direction
-    if not is_tapered:
-        return LineSurface(middle, direction, _weighted_median(e.radius[chosen], weight)), along
-    mean_s, mean_r = weight @ along, weight @ e.radius[chosen]
-    slope = (
-        weight @ ((along - mean_s) * (e.radius[chosen] - mean_r)) / (weight @ (along - mean_s) ** 2)
-    )
-    return LineSurface(middle, direction, mean_r - slope * mean_s, slope, is_tapered=True), along
-
-
-def _weighted_median(values: Array, weights: Array) -> float:
-    order = np.argsort(values)
-    cumulated = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(cumulated, 0.5 * cumulated[-1])]])
-
-
-def _longest_part(along: Array, max_gap: float) -> NDArray[np.intp]:
-    """Indices of the part with most entries that has no gap longer than `max_gap`."""
-    order = np.argsort(along)
-    parts = np.split(order, np.flatnonzero(np.diff(along[order]) > max_gap) + 1)
-    return max(parts, key=len)
+        for k, line in enumerate(lines)
+    ]
+    return pieces, members[number < 0]
 
 
 def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:

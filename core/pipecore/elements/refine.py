@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels.extent import points_between
+from pipecore._kernels.misfit import look_at_sphere
 from pipecore.elements.bands import is_off_bands
 from pipecore.elements.extent import (
     MAX_SECTORS,
     Extent,
     find_extent,
     section_misfit,
-    sphere_misfit,
 )
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, arc_direction
@@ -51,6 +51,8 @@ INSIDE = 0.1
 """Points are well inside a surface from this share of its radius on."""
 MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
+PATCHES = 12, 8, 5
+"""Patches of a sphere around and up, and the points from which on one counts."""
 N_ROUNDS = 3
 HARDLY_ROUGH, ROUGH, VERY_ROUGH = 1.15, 1.5, 3.0
 """Slack for pieces fitted to a sample at last, and for those whose last round of fitting is
@@ -373,13 +375,9 @@ def _refine_sphere(
 
 
 def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:
-    model = fit.model
-    xyz = nearby.surface.xyz[own]
-    upright = np.array([0.0, 0.0, 1.0])
-    height = (xyz - model.centre) @ upright
-    axis = LineAxis(model.centre + height.min() * upright, upright, float(np.ptp(height)))
-    _, _, clock = axis.pipe_coordinates(xyz)
-    arc = float(len(np.unique((clock / (2 * np.pi) * 36).astype(int))) / 36 * 2 * np.pi)
-    residual, _, outward = model.residuals(xyz)
-    misfit = sphere_misfit(outward, residual)
+    model, upright = fit.model, np.array([0.0, 0.0, 1.0])
+    misfit, low, high, arc = look_at_sphere(
+        nearby.surface.xyz, own, model.centre, model.radius, MAX_SECTORS, *PATCHES
+    )
+    axis = LineAxis(model.centre + low * upright, upright, high - low)
     return Fitted(fit, axis, own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)

@@ -126,25 +126,23 @@ def fit_ellipses(
     def work(start: int, stop: int) -> None:
         kernels.fit_curves(
             curves.uv, curves.normals, curves.starts, start, stop,
-            tolerance, 4.0 * surface.voxel, fits,
+            tolerance, 4.0 * surface.voxel, 1.0 - settings.max_flattening, MAX_OFF_AXIS, fits,
         )  # fmt: skip
 
     for_chunks(work, len(curves), 512, "ellipses", progress, span)
-    tilt_cos, radius, rms, arc = fits[:, 4], fits[:, 5], fits[:, 6], fits[:, 7]
+    radius, rms, arc = fits[:, 5], fits[:, 6], fits[:, 7]
     max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
     radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits[:, 8])
     with np.errstate(invalid="ignore"):
         is_sure = (arc >= SURE_ARC) | (radius_sd < MAX_RADIUS_SD * radius)
         accepted = (
-            (1.0 - tilt_cos <= settings.max_flattening)
-            & (arc >= np.deg2rad(settings.min_arc_deg))
+            (arc >= np.deg2rad(settings.min_arc_deg))
             & is_sure
             & (rms <= max_rms)
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
             & (radius <= 1.2 * sizes.max_radius_mm / 1e3)
             & (fits[:, 11] >= MIN_RADIAL)
-            & (fits[:, 9] <= MAX_OFF_AXIS * fits[:, 10])
         )
     kept = np.flatnonzero(accepted)
     fits = fits[kept]

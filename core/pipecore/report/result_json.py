@@ -11,7 +11,6 @@ reader refuses a larger `format_version`; keys may be added within a version.
 """
 
 import dataclasses
-import json
 import math
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import orjson
 
 import pipecore
 from pipecore.geometry import ArcAxis, LineAxis
@@ -34,6 +34,13 @@ DECIMALS = 9
 
 def result_to_dict(result: Result) -> dict[str, Any]:
     """Return a result as plain dicts, lists, strings and numbers, ready for JSON."""
+    plain = _plain(_content(result))
+    assert isinstance(plain, dict)
+    return plain
+
+
+def _content(result: Result) -> dict[str, Any]:
+    """What ``result.json`` holds; profiles are arrays still, all else is plain."""
     unit = result.settings.input.length_unit
     return {
         "format": FORMAT,
@@ -55,7 +62,7 @@ def result_to_dict(result: Result) -> dict[str, Any]:
         "stacks": _plain(result.stacks),
         "elements": _plain(result.elements),
         "profiles": {
-            f.name: _plain(np.round(getattr(result.profiles, f.name), DECIMALS))
+            f.name: np.round(getattr(result.profiles, f.name), DECIMALS)
             for f in dataclasses.fields(result.profiles)
         },
         "deformations": _plain(result.deformations),
@@ -65,22 +72,23 @@ def result_to_dict(result: Result) -> dict[str, Any]:
 def write_result_json(path: Path, result: Result, progress: Progress | None = None) -> None:
     """Write ``result.json``, a line for each key, so that a person can look into it too."""
     progress = progress or NoProgress()
-    with path.open("w", encoding="utf-8") as file:
-        for i, (key, value) in enumerate(result_to_dict(result).items()):
-            file.write(",\n" if i else "{\n")
+    with path.open("wb") as file:
+        for i, (key, value) in enumerate(_content(result).items()):
+            file.write(b",\n" if i else b"{\n")
             if not isinstance(value, dict):
-                file.write(f"{_dumped(key)}: {_dumped(value)}")
+                file.write(_dumped(key) + b": " + _dumped(value))
                 continue
-            file.write(f"{_dumped(key)}: {{")
+            file.write(_dumped(key) + b": {")
             for j, (name, item) in enumerate(value.items()):
                 progress.update("writing result", j / len(value))
-                file.write(f"{',' if j else ''}\n {_dumped(name)}: {_dumped(item)}")
-            file.write("}")
-        file.write("\n}\n")
+                file.write((b",\n " if j else b"\n ") + _dumped(name) + b": " + _dumped(item))
+            file.write(b"}")
+        file.write(b"\n}\n")
 
 
-def _dumped(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+def _dumped(value: Any) -> bytes:
+    """JSON of plain values and of arrays; what is not finite becomes null."""
+    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _plain(value: Any) -> Any:

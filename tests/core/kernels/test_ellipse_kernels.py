@@ -31,8 +31,19 @@ def fit(*curves, tolerance=0.004, max_gap=0.04):
     uv, normals = (np.concatenate(c) for c in zip(*curves, strict=True))
     starts = np.cumsum([0, *(len(c[0]) for c in curves)])
     fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
-    kernels.fit_curves(uv, normals, starts, 0, len(curves), tolerance, max_gap, fits)
+    kernels.fit_curves(uv, normals, starts, 0, len(curves), tolerance, max_gap, 0.0, np.inf, fits)
     return fits
+
+
+def test_that_curves_with_a_steep_or_hardly_defined_axis_are_none(rng):
+    angles = np.linspace(0, np.pi, 40)
+    uv, normals = cut_cylinder(axis_of(30.0, 10.0), np.zeros(2), 0.1, angles)
+    for limits, is_one in (((0.85, np.inf), True), ((0.88, np.inf), False), ((0.0, -1.0), False)):
+        fits = np.empty((1, kernels.N_FIT_COLUMNS))
+        starts = np.array([0, len(uv)])
+        kernels.fit_curves(uv, normals, starts, 0, 1, 0.002, 0.05, *limits, fits)
+        assert np.isfinite(fits).all() == is_one
+        assert np.isnan(fits).all() != is_one
 
 
 def test_that_the_common_axis_is_the_least_eigenvector_of_the_normals(rng):

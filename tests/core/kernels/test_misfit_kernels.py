@@ -63,3 +63,21 @@ def test_that_the_least_sum_of_distances_passes_by_what_is_far_off(rng):
     left = misfit.least_distances(terms, values, np.full(40, 1e-3), 30)
     assert_allclose(left[::4], 5.0, atol=0.02)
     assert np.abs(np.delete(left, np.s_[::4])).max() < 0.02
+
+
+def test_that_a_sphere_is_held_against_the_medians_of_its_patches(rng):
+    n, radius = 4000, 0.3
+    out = rng.normal(size=(n, 3))
+    out /= np.linalg.norm(out, axis=1)[:, None]
+    centre = rng.normal(size=3)
+    # A quarter about the vertical is not seen, and the lower part neither; noise has no say.
+    seen = np.flatnonzero((np.arctan2(out[:, 1], out[:, 0]) > -np.pi / 2) & (out[:, 2] > -0.5))
+    departure = np.where(out[:, 2] > 0.0, 0.004, -0.002) + rng.normal(0, 1e-4, n)
+    xyz = centre + (radius + departure)[:, None] * out
+    found, low, high, arc = misfit.look_at_sphere(xyz, seen, centre, radius, 36, 12, 8, 5)
+    # Of eight even steps of height four are above the middle and two below.
+    assert found == pytest.approx(np.sqrt((4 * 0.004**2 + 2 * 0.002**2) / 6), rel=0.02)
+    assert low == pytest.approx((xyz[seen, 2] - centre[2]).min())
+    assert high == pytest.approx((xyz[seen, 2] - centre[2]).max())
+    assert arc == pytest.approx(1.5 * np.pi, abs=0.2)
+    assert misfit.look_at_sphere(xyz, seen[:3], centre, radius, 36, 12, 8, 5)[0] == np.inf

@@ -115,3 +115,54 @@ def test_that_taken_ellipses_are_not_found_again(rng):
     args = centre, axis, np.full(10, 0.1), np.full(10, 1e-4), none_free, 50
     assert kernels.best_line(*args, False, MIN_COS, 0.06, 0.06, inliers) == 0
     assert kernels.best_arc(*args, MIN_COS, 0.06, 0.06, inliers, np.empty(8)) == 0
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.25])
+def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng, slope):
+    lines = [LineAxis(rng.normal(size=3), random_direction(rng), length) for length in (0.9, 0.5)]
+    s = [np.linspace(0.0, line.length, n) for line, n in zip(lines, (40, 20), strict=True)]
+    planted = [
+        (line.at(x), np.tile(line.direction, (len(x), 1)), 0.1 + slope * x)
+        for line, x in zip(lines, s, strict=True)
+    ]
+    centre, axis, radius = both(both(*planted), scattered(rng, 15))
+    limits = MIN_COS, 0.06, 0.06, 0.025, 0.04
+    piece = np.empty(75, np.int32)
+
+    def take(is_tapered, min_length):
+        return kernels.take_lines(
+            centre, axis, radius, np.full(75, 1e-4), 300, is_tapered, limits, 0.02, min_length,
+            5, piece,
+        )  # fmt: skip
+
+    found = take(bool(slope), 0.5)
+    assert len(found) == 2
+    assert (piece[:40] == 0).all()
+    assert (piece[40:60] == 1).all()
+    assert (piece[60:] == -1).sum() >= 13
+    for line, x, row in zip(lines, s, found, strict=True):
+        along = (row[:3] - line.start) @ line.direction
+        sign = np.sign(row[3:6] @ line.direction)
+        assert abs(row[3:6] @ line.direction) > 1 - 1e-6
+        assert np.linalg.norm(row[:3] - line.at(along)) < 1e-3
+        assert row[6] == pytest.approx(0.1 + slope * along, rel=1e-2)
+        assert row[7] == pytest.approx(sign * slope, abs=1e-2)
+        assert row[9] - row[8] == pytest.approx(x[-1] + 0.02, abs=0.05)
+    # What is shorter than asked for, or tapers otherwise than asked for, is none.
+    assert len(take(bool(slope), 20.0)) == 0
+    assert (piece == -1).all()
+    assert slope or len(take(not slope, 0.5)) == 0
+
+
+def test_that_the_longest_part_is_that_with_most_entries_and_no_gap(rng):
+    along = np.concatenate([np.linspace(0, 1, 11), np.linspace(1.5, 2, 21), np.linspace(3, 5, 5)])
+    order = rng.permutation(len(along))
+    part = kernels.longest_part(along[order], 0.3)
+    assert along[order][part].tolist() == along[11:32].tolist()
+    assert len(kernels.longest_part(along[order], 1.1)) == len(along)
+
+
+def test_that_half_of_the_weight_is_below_the_weighted_median(rng):
+    values, weights = rng.normal(size=41), rng.uniform(0.1, 2, 41)
+    median = kernels.weighted_median(values, weights)
+    assert weights[values < median].sum() < weights.sum() / 2 <= weights[values <= median].sum()
