@@ -234,7 +234,7 @@ def preview_profile(
     max_radius = settings.elements.max_radius_mm / 1e3
     curves = segment_profiles(surface, stack, settings.profiles, max_radius, progress)
     frame = curves.frame
-    ellipses = fit_ellipses(curves, surface, settings.ellipses, settings.elements, progress)
+    ellipses = fit_ellipses(curves, surface, settings.ellipses, settings.elements)
     uv = surface.xyz @ frame[:2].T
     curve = np.full(len(uv), -1, np.intp)
     curve[curves.points] = curves.curve_of_point

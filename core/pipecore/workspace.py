@@ -15,8 +15,8 @@ from pipecore._kernels.grouping import spread_to_members
 from pipecore.allocation import BLOCK, Allocate, in_memory
 from pipecore.ellipses import Ellipses, fit_ellipses
 from pipecore.parallel import for_chunks
-from pipecore.profiles import Curves, segment_profiles
-from pipecore.progress import Progress, Renamed
+from pipecore.profiles import Curves, cut_portions
+from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.stacks.directions import local_axes
 from pipecore.surface import Order, Surface, planes_of_points, sample_surface
@@ -122,8 +122,9 @@ class InMemory:
         span: tuple[float, float],
     ) -> Iterator[Cut]:
         """See `Workspace`."""
-        curves, ellipses = cut_and_fit(uneven.surface, stack, settings, progress, span)
-        yield uneven.rows[curves.points], curves.starts, ellipses
+        portions = cut_and_fit(uneven.surface, stack, settings, progress, span)
+        for points, starts, ellipses in portions:
+            yield uneven.rows[points], starts, ellipses
 
 
 def cut_and_fit(
@@ -132,19 +133,21 @@ def cut_and_fit(
     settings: Settings,
     progress: Progress,
     span: tuple[float, float] = (0.0, 1.0),
-) -> tuple[Curves, Ellipses]:
-    """Cut a stack of a surface or of a part that holds whole profiles; fit its ellipses."""
-    begin, end = span
-    middle = begin + 0.85 * (end - begin)
+) -> list[Cut]:
+    """Cut a stack of a surface or of a part that holds whole profiles; fit its ellipses.
+
+    Returns
+    -------
+    list of Cut
+        Of a portion of the profiles each, with places in the surface.
+    """
+
+    def fit(curves: Curves, check: Callable[[], None]) -> Cut:
+        ellipses = fit_ellipses(curves, surface, settings.ellipses, settings.elements, check)
+        return curves.points, curves.starts, ellipses
+
     max_radius = settings.elements.max_radius_mm / 1e3
-    curves = segment_profiles(
-        surface, stack, settings.profiles, max_radius, progress, (begin, middle)
-    )
-    told = Renamed(progress, "profiles")
-    ellipses = fit_ellipses(
-        curves, surface, settings.ellipses, settings.elements, told, (middle, end)
-    )
-    return curves, ellipses
+    return cut_portions(surface, stack, settings.profiles, max_radius, fit, progress, span)
 
 
 def spread(

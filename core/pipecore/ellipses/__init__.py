@@ -10,9 +10,7 @@ from pipecore._kernels import ellipses as kernels
 from pipecore.ellipses.direct import PlaneEllipses, fit_direct_ellipses
 from pipecore.ellipses.free import fit_free_ellipses
 from pipecore.ellipses.uncertainty import radius_sd_factor
-from pipecore.parallel import for_chunks
 from pipecore.profiles import Curves
-from pipecore.progress import Progress
 from pipecore.settings import ElementSettings, EllipseFit, EllipseSettings
 from pipecore.surface import Surface
 
@@ -110,26 +108,21 @@ def fit_ellipses(
     surface: Surface,
     settings: EllipseSettings,
     sizes: ElementSettings,
-    progress: Progress,
-    span: tuple[float, float] = (0.0, 1.0),
+    check: Callable[[], None] = lambda: None,
 ) -> Ellipses:
     """Fit an ellipse to every curve of a stack and keep those that are one.
 
     The ellipse is constrained: an oblique cut through a cylinder whose direction comes
     from the points' normals. It is kept if its flattening, arc, residual and radius are
     within bounds, its normals point to its centre, and Akaike's criterion prefers it to
-    a line.
+    a line. `check` is called now and then; it may raise to cancel.
     """
     fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
     tolerance = surface.tolerance
-
-    def work(start: int, stop: int) -> None:
-        kernels.fit_curves(
-            curves.uv, curves.normals, curves.starts, start, stop,
-            tolerance, 4.0 * surface.voxel, 1.0 - settings.max_flattening, MAX_OFF_AXIS, fits,
-        )  # fmt: skip
-
-    for_chunks(work, len(curves), 512, "ellipses", progress, span)
+    kernels.fit_curves(
+        curves.uv, curves.normals, curves.starts, 0, len(curves),
+        tolerance, 4.0 * surface.voxel, 1.0 - settings.max_flattening, MAX_OFF_AXIS, fits,
+    )  # fmt: skip
     radius, rms, arc = fits[:, 5], fits[:, 6], fits[:, 7]
     max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
     radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits[:, 8])
@@ -147,9 +140,7 @@ def fit_ellipses(
     kept = np.flatnonzero(accepted)
     fits = fits[kept]
     is_long = fits[:, 7] >= FREE_FIT_ARC
-    line_rss, free = _competing_fits(
-        curves, kept, is_long, settings.fit, lambda: progress.update("ellipses", span[1])
-    )
+    line_rss, free = _competing_fits(curves, kept, is_long, settings.fit, check)
     n_points = np.diff(curves.starts)[kept]
     aic_line = akaike(LINE_PARAMETERS, n_points, line_rss)
     circle_rss = fits[:, 6] ** 2 * n_points

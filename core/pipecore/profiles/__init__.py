@@ -1,7 +1,8 @@
 """Profile segmentation: the points of each profile joined to curves (paper, section 3.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from pipecore._kernels import ellipses as ellipse_kernels
 from pipecore._kernels import profiles as kernels
 from pipecore._kernels.grouping import group_from, group_large
 from pipecore.geometry import unit
-from pipecore.parallel import for_chunks
+from pipecore.parallel import for_chunks, for_items
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ProfileMethod, ProfileSettings
 from pipecore.surface import Surface
@@ -116,19 +117,54 @@ def segment_profiles(
     span : (float, float)
         Which part of the stage "profiles" this is.
     """
+    frame = stack_frame(stack.direction)
+    portions = cut_portions(
+        surface, stack, settings, max_radius, lambda curves, _: curves, progress, span
+    )
+    return _concatenated(stack, frame, portions)
+
+
+Made = TypeVar("Made")
+
+
+def cut_portions(
+    surface: Surface,
+    stack: Stack,
+    settings: ProfileSettings,
+    max_radius: float,
+    make: Callable[[Curves, Callable[[], None]], Made],
+    progress: Progress = NoProgress(),
+    span: tuple[float, float] = (0.0, 1.0),
+) -> list[Made]:
+    """Do as `segment_profiles`, but a portion of whole profiles at a time, in threads.
+
+    Parameters
+    ----------
+    surface, stack, settings, max_radius, progress, span
+        As there.
+    make : callable
+        Makes what is wanted of a portion's curves, in its thread; also given what it is to call
+        now and then where that takes long.
+
+    Returns
+    -------
+    list
+        What was made, in the order of the profiles; of no curves where the stack cuts nothing.
+    """
     begin, end = span
     progress.update("profiles", begin)
     middle = begin + 0.1 * (end - begin)
     cutter = _Cutter(surface, stack, settings, max_radius, progress, (begin, middle))
     bounds = cutter.bounds()
-    parts: list[Curves | None] = [None] * (len(bounds) - 1)
+    if len(bounds) < 2:
+        return [make(_concatenated(stack, cutter.frame, []), lambda: None)]
+    made: dict[int, Made] = {}
 
-    def cut(first: int, last: int) -> None:
-        for k in range(first, last):
-            parts[k] = cutter.cut(bounds[k], bounds[k + 1])
+    def cut(k: int, check: Callable[[], None]) -> None:
+        made[k] = make(cutter.cut(bounds[k], bounds[k + 1]), check)
 
-    for_chunks(cut, len(parts), 1, "profiles", progress, (middle, end))
-    return _concatenated(stack, cutter.frame, parts)
+    for_items(cut, len(bounds) - 1, "profiles", progress, (middle, end))
+    return [made[k] for k in range(len(bounds) - 1)]
 
 
 class _Cutter:
@@ -223,11 +259,8 @@ class _Cutter:
         return Curves(self._stack, self.frame, own, places, vectors, starts, index)
 
 
-def _concatenated(
-    stack: Stack, frame: NDArray[np.float64], parts: Sequence[Curves | None]
-) -> Curves:
-    """One table of the curves of all parts."""
-    curves = [c for c in parts if c is not None]
+def _concatenated(stack: Stack, frame: NDArray[np.float64], curves: Sequence[Curves]) -> Curves:
+    """One table of the curves of all portions."""
     sizes = [np.diff(c.starts) for c in curves]
     return Curves(
         stack,

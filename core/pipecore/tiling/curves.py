@@ -6,7 +6,7 @@ curves share.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -193,8 +193,8 @@ def ellipses_of_batch(
     index = of_all("cut")
     xyz, normals, spacing = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
     surface = Surface(xyz, normals, spacing, NOTHING_BEHIND, facts.voxel, facts.noise)
-    curves, ellipses = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
-    store.save(f"points-{number}", index[curves.points])
-    store.save(f"curves-{number}", curves.starts)
-    # Without the profile's frame as a view, which does not travel.
-    return Ellipses(*(np.array(getattr(ellipses, f.name)) for f in fields(Ellipses)))
+    cuts = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
+    store.save(f"points-{number}", index[np.concatenate([points for points, _, _ in cuts])])
+    sizes = [np.diff(starts) for _, starts, _ in cuts]
+    store.save(f"curves-{number}", np.cumsum(np.concatenate([np.zeros(1, np.int64), *sizes])))
+    return Ellipses.concatenate([own for _, _, own in cuts])

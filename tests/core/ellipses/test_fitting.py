@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose
 from pipecore.ellipses import FREE_FIT_ARC, Ellipses, fit_ellipses
 from pipecore.geometry import LineAxis, unit
 from pipecore.profiles import segment_profiles
-from pipecore.progress import NoProgress
 from pipecore.settings import ElementSettings, EllipseSettings, ProfileSettings
 from pipecore.surface import Surface
 from pipecore.types import Stack
@@ -29,7 +28,7 @@ ALL = EllipseSettings()
 def ellipses_of(surface: Surface, direction, settings=ALL, width=0.02) -> Ellipses:
     stack = Stack(1, unit(direction), width)
     curves = segment_profiles(surface, stack, ProfileSettings(), max_radius=5.0)
-    return fit_ellipses(curves, surface, settings, ElementSettings(), NoProgress())
+    return fit_ellipses(curves, surface, settings, ElementSettings())
 
 
 def tilted(rng, axis: LineAxis, tilt_deg: float):
@@ -171,4 +170,4 @@ def test_that_sizes_out_of_bounds_are_not_used(rng):
     surface = known(points)
     curves = segment_profiles(surface, stack, ProfileSettings(), max_radius=5.0)
     for sizes in (ElementSettings(max_radius_mm=60.0), ElementSettings(min_radius_mm=150.0)):
-        assert len(fit_ellipses(curves, surface, EllipseSettings(), sizes, NoProgress())) == 0
+        assert len(fit_ellipses(curves, surface, EllipseSettings(), sizes)) == 0
