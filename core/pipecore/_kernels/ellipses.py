@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.circles import geometric_circle, taubin_circle
+from pipecore._kernels.draws import draw, seeded
 from pipecore._kernels.eigen import eigenvalues, eigenvector
 
 MIN_PAIR_COS = 0.94
@@ -80,18 +81,6 @@ def fits_circle(x, y, mx, my, cx, cy, r, max_distance, cos_radial):
 
 
 @njit(cache=True, nogil=True)
-def next_random(state):
-    """Next state of a linear congruential generator (Knuth's MMIX constants)."""
-    return state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)
-
-
-@njit(cache=True, nogil=True)
-def drawn(state, n):
-    """Return a number below `n` from a random state."""
-    return np.int64(((state >> np.uint64(33)) * np.uint64(n)) >> np.uint64(31))
-
-
-@njit(cache=True, nogil=True)
 def pick_pair(nus, nvs, nds, state):
     """Two points whose normals differ clearly: state, indices, or -1 if luck fails.
 
@@ -104,13 +93,11 @@ def pick_pair(nus, nvs, nds, state):
     while n >> n_halvings > 3:
         n_halvings += 1
     for _ in range(12):
-        state = next_random(state)
-        reach = n >> drawn(state, n_halvings)
-        state = next_random(state)
-        i = drawn(state, n)
-        state = next_random(state)
-        low, high = max(0, i - reach), min(n, i + reach + 1)
-        j = low + drawn(state, high - low)
+        state, halvings = draw(state, n_halvings)
+        state, i = draw(state, n)
+        low, high = max(0, i - (n >> halvings)), min(n, i + (n >> halvings) + 1)
+        state, ahead = draw(state, high - low)
+        j = low + ahead
         if abs(nus[i] * nus[j] + nvs[i] * nvs[j] + nds[i] * nds[j]) < MIN_PAIR_COS:
             return state, i, j
     return state, -1, -1
@@ -172,7 +159,7 @@ def best_circle(
     )  # fmt: skip
     best_turn = 0.0
     best_au = best_av = best_ad = best_cx = best_cy = best_r = 0.0
-    state = np.uint64(seed) * np.uint64(2862933555777941757) + np.uint64(3037000493)
+    state = seeded(seed)
     for _ in range(n_trials):
         state, i, j = pick_pair(nus, nvs, nds, state)
         if i < 0:
@@ -342,8 +329,8 @@ def covered_arc(angles, max_gap):
     return 2.0 * math.pi - uncovered
 
 
-N_FIT_COLUMNS = 16
-"""Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points; λ1, λ2 of the normals;
+N_FIT_COLUMNS = 14
+"""Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points;
 share of radial normals; where the normals meet u, v, d, and the points' distance from there."""
 
 
@@ -419,8 +406,7 @@ def fit_curves(
         fits[c, 6] = math.sqrt(ss / total)
         fits[c, 7] = arc
         fits[c, 8] = n_in
-        fits[c, 9], fits[c, 10] = l1, l2
-        fits[c, 11] = n_radial / n
+        fits[c, 9] = n_radial / n
         det = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
         if det > 0.0:
             mu = (
@@ -438,5 +424,5 @@ def fit_curves(
                     distance += math.sqrt(
                         (points[k, 0] - mu) ** 2 + (points[k, 1] - mv) ** 2 + md * md
                     )
-            fits[c, 12], fits[c, 13], fits[c, 14] = mu, mv, md
-            fits[c, 15] = distance / n_in
+            fits[c, 10], fits[c, 11], fits[c, 12] = mu, mv, md
+            fits[c, 13] = distance / n_in

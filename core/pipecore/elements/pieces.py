@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipecore._kernels import pieces as kernels
+from pipecore._kernels.arcs import best_arc
+from pipecore._kernels.lines import best_line, take_lines
 from pipecore.axes import join_centres
 from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
 from pipecore.ellipses import Ellipses
@@ -144,7 +145,7 @@ def _take_lines(
         return [], members
     e = rows[members]
     number = np.empty(len(members), np.int32)
-    lines = kernels.take_lines(
+    lines = take_lines(
         e.centre, e.axis, e.radius, e.radius_sd, N_TRIALS, is_tapered,
         (MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER), float(np.median(e.width)),
         min_length, MIN_ELLIPSES, number,
@@ -169,7 +170,7 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
     arc = np.empty(8)
     pieces: list[Piece] = []
     while free.sum() >= MIN_ELLIPSES:
-        count = kernels.best_arc(
+        count = best_arc(
             e.centre, e.axis, e.radius, e.radius_sd, free, N_TRIALS,
             MIN_COS, 1.5 * MAX_OFFSET, 1.5 * MAX_CHANGE, inliers, arc,
         )  # fmt: skip
@@ -178,7 +179,7 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
         chosen = np.flatnonzero(inliers)
         free[chosen] = False
         straight = np.empty(len(members), np.bool_)
-        n_straight = kernels.best_line(
+        n_straight = best_line(
             e.centre, e.axis, e.radius, e.radius_sd, inliers, N_TRIALS, False,
             MIN_COS, MAX_OFFSET, MAX_CHANGE, straight,
         )  # fmt: skip

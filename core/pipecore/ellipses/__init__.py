@@ -135,7 +135,7 @@ def fit_ellipses(
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
             & (radius <= 1.2 * sizes.max_radius_mm / 1e3)
-            & (fits[:, 11] >= MIN_RADIAL)
+            & (fits[:, 9] >= MIN_RADIAL)
         )
     kept = np.flatnonzero(accepted)
     fits = fits[kept]
@@ -220,8 +220,8 @@ def _to_space(
         axis=axis,
         radius=radius,
         radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),
-        meeting_point=_combined(fits[:, 12:15], frame) + curves.mid_plane(kept)[:, None] * frame[2],
-        meeting_distance=fits[:, 15],
+        meeting_point=_combined(fits[:, 10:13], frame) + curves.mid_plane(kept)[:, None] * frame[2],
+        meeting_distance=fits[:, 13],
         arc=arc,
         n_points=n_points,
         rms=fits[:, 6],

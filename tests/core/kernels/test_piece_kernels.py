@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipecore._kernels import pieces as kernels
+from pipecore._kernels import arcs, draws, lines
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
 
@@ -25,7 +25,7 @@ def test_that_an_ellipse_is_on_a_line_if_place_direction_and_radius_agree(rng):
         r = expected * (1 + rng.uniform(-0.12, 0.12))
         axis = np.cos(tilt) * line.direction + np.sin(tilt) * right
         axis *= rng.choice([-1, 1])
-        found = kernels.on_line(
+        found = lines.on_line(
             *(line.at(s) + off * up), *axis, r, sd, *line.start, *line.direction,
             radius, slope, MIN_COS, 0.06, 0.06,
         )  # fmt: skip
@@ -50,7 +50,7 @@ def test_that_an_ellipse_is_on_an_arc_if_place_direction_and_radius_agree(rng):
         off = rng.uniform(0, 0.02)
         r = radius * (1 + rng.uniform(-0.12, 0.12))
         axis = np.cos(tilt) * arc.tangent(s) + np.sin(tilt) * up
-        found = kernels.on_arc(
+        found = arcs.on_arc(
             *(arc.at(s) + off * up), *axis, r, sd, *arc.centre, *arc.normal, 0.3, radius,
             MIN_COS, 0.06, 0.06,
         )  # fmt: skip
@@ -81,7 +81,7 @@ def test_that_the_line_with_most_ellipses_is_found_among_strays(rng, slope):
     planted = line.at(s), np.tile(line.direction, (25, 1)), 0.1 + slope * s
     centre, axis, radius = both(planted, scattered(rng, 15))
     inliers = np.empty(40, np.bool_)
-    count = kernels.best_line(
+    count = lines.best_line(
         centre, axis, radius, np.full(40, 1e-4), np.ones(40, np.bool_), 150, bool(slope),
         MIN_COS, 0.06, 0.06, inliers,
     )  # fmt: skip
@@ -97,7 +97,7 @@ def test_that_the_arc_with_most_ellipses_is_found_with_its_centre_and_bend_radiu
     planted = bend.at(s), np.array(bend.tangent(s)), np.full(25, 0.1)
     centre, axis, radius = both(planted, scattered(rng, 15))
     inliers, arc = np.empty(40, np.bool_), np.empty(8)
-    count = kernels.best_arc(
+    count = arcs.best_arc(
         centre, axis, radius, np.full(40, 1e-4), np.ones(40, np.bool_), 300,
         MIN_COS, 0.06, 0.06, inliers, arc,
     )  # fmt: skip
@@ -113,24 +113,24 @@ def test_that_taken_ellipses_are_not_found_again(rng):
     centre, axis = line.at(np.linspace(0, 0.6, 10)), np.tile(line.direction, (10, 1))
     inliers, none_free = np.empty(10, np.bool_), np.zeros(10, np.bool_)
     args = centre, axis, np.full(10, 0.1), np.full(10, 1e-4), none_free, 50
-    assert kernels.best_line(*args, False, MIN_COS, 0.06, 0.06, inliers) == 0
-    assert kernels.best_arc(*args, MIN_COS, 0.06, 0.06, inliers, np.empty(8)) == 0
+    assert lines.best_line(*args, False, MIN_COS, 0.06, 0.06, inliers) == 0
+    assert arcs.best_arc(*args, MIN_COS, 0.06, 0.06, inliers, np.empty(8)) == 0
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.25])
 def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng, slope):
-    lines = [LineAxis(rng.normal(size=3), random_direction(rng), length) for length in (0.9, 0.5)]
-    s = [np.linspace(0.0, line.length, n) for line, n in zip(lines, (40, 20), strict=True)]
+    pipes = [LineAxis(rng.normal(size=3), random_direction(rng), length) for length in (0.9, 0.5)]
+    s = [np.linspace(0.0, line.length, n) for line, n in zip(pipes, (40, 20), strict=True)]
     planted = [
         (line.at(x), np.tile(line.direction, (len(x), 1)), 0.1 + slope * x)
-        for line, x in zip(lines, s, strict=True)
+        for line, x in zip(pipes, s, strict=True)
     ]
     centre, axis, radius = both(both(*planted), scattered(rng, 15))
     limits = MIN_COS, 0.06, 0.06, 0.025, 0.04
     piece = np.empty(75, np.int32)
 
     def take(is_tapered, min_length):
-        return kernels.take_lines(
+        return lines.take_lines(
             centre, axis, radius, np.full(75, 1e-4), 300, is_tapered, limits, 0.02, min_length,
             5, piece,
         )  # fmt: skip
@@ -140,7 +140,7 @@ def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng,
     assert (piece[:40] == 0).all()
     assert (piece[40:60] == 1).all()
     assert (piece[60:] == -1).sum() >= 13
-    for line, x, row in zip(lines, s, found, strict=True):
+    for line, x, row in zip(pipes, s, found, strict=True):
         along = (row[:3] - line.start) @ line.direction
         sign = np.sign(row[3:6] @ line.direction)
         assert abs(row[3:6] @ line.direction) > 1 - 1e-6
@@ -157,12 +157,22 @@ def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng,
 def test_that_the_longest_part_is_that_with_most_entries_and_no_gap(rng):
     along = np.concatenate([np.linspace(0, 1, 11), np.linspace(1.5, 2, 21), np.linspace(3, 5, 5)])
     order = rng.permutation(len(along))
-    part = kernels.longest_part(along[order], 0.3)
+    part = lines.longest_part(along[order], 0.3)
     assert along[order][part].tolist() == along[11:32].tolist()
-    assert len(kernels.longest_part(along[order], 1.1)) == len(along)
+    assert len(lines.longest_part(along[order], 1.1)) == len(along)
 
 
 def test_that_half_of_the_weight_is_below_the_weighted_median(rng):
     values, weights = rng.normal(size=41), rng.uniform(0.1, 2, 41)
-    median = kernels.weighted_median(values, weights)
+    median = lines.weighted_median(values, weights)
     assert weights[values < median].sum() < weights.sum() / 2 <= weights[values <= median].sum()
+
+
+def test_that_draws_are_below_their_bound_and_even():
+    state = draws.seeded(5)
+    counts = np.zeros(7, int)
+    for _ in range(7000):
+        state, i = draws.draw(state, 7)
+        counts[i] += 1
+    assert abs(counts - 1000).max() < 150
+    assert draws.seeded(5) != draws.seeded(6)

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import pipecore.profiles
 from pipecore.geometry import LineAxis
 from pipecore.profiles import (
     MAX_PIECES,
     MAX_SLOPE,
     MIN_CURVE,
     Curves,
+    cut_portions,
     segment_profiles,
     stack_frame,
 )
@@ -258,3 +260,21 @@ def test_that_a_surface_without_normals_has_no_curves():
     curves = cut(surface)
     assert len(curves) == 0
     assert list(curves.starts) == [0]
+
+
+def test_that_portions_hold_whole_profiles_and_together_all_curves(rng, monkeypatch):
+    surface = known(pipe(rng, 0.0, 0.0, 0.05), pipe(rng, 0.2, 0.0, 0.05))
+    whole = cut(surface)
+    monkeypatch.setattr(pipecore.profiles, "POINTS_AT_A_TIME", len(surface.xyz) // 4)
+    portions = cut_portions(surface, ALONG_X, CURVE_FITTING, 5.0, lambda curves, _: curves)
+    assert len(portions) > 2
+    profiles = [set(curves.profile_index) for curves in portions]
+    assert sum(map(len, profiles)) == len(set.union(*profiles)) == 10
+    assert np.concatenate([c.points for c in portions]).tolist() == whole.points.tolist()
+    assert_allclose(np.concatenate([c.uv for c in portions]), whole.uv)
+
+
+def test_that_a_stack_that_cuts_nothing_is_one_portion_without_curves():
+    surface = known((np.zeros((5, 3)), np.full((5, 3), np.nan)))
+    portions = cut_portions(surface, ALONG_X, CURVE_FITTING, 5.0, lambda curves, _: len(curves))
+    assert portions == [0]
