@@ -11,10 +11,20 @@ def seeded(seed):
 
 
 @njit(cache=True, nogil=True)
-def draw(state, n):
-    """Next state of a linear congruential generator (Knuth's MMIX), and an index below `n`.
+def next_random(state):
+    """Next state of a linear congruential generator (Knuth's MMIX constants)."""
+    return state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)
 
-    The index is of the state's high bits, without the division that a remainder takes.
-    """
-    state = state * np.uint64(6364136223846793005) + np.uint64(1442695040888963407)
+
+@njit(cache=True, nogil=True)
+def draw(state, n):
+    """Next state, and an index below `n`."""
+    state = next_random(state)
+    return state, np.int64((state >> np.uint64(33)) % np.uint64(n))
+
+
+@njit(cache=True, nogil=True)
+def draw_fast(state, n):
+    """Do as `draw`, without its division, for the innermost loops: other indices."""
+    state = next_random(state)
     return state, np.int64(((state >> np.uint64(33)) * np.uint64(n)) >> np.uint64(31))

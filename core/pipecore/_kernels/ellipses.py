@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.circles import geometric_circle, taubin_circle
-from pipecore._kernels.draws import draw, seeded
+from pipecore._kernels.draws import draw_fast, seeded
 from pipecore._kernels.eigen import eigenvalues, eigenvector
 
 MIN_PAIR_COS = 0.94
@@ -93,10 +93,10 @@ def pick_pair(nus, nvs, nds, state):
     while n >> n_halvings > 3:
         n_halvings += 1
     for _ in range(12):
-        state, halvings = draw(state, n_halvings)
-        state, i = draw(state, n)
+        state, halvings = draw_fast(state, n_halvings)
+        state, i = draw_fast(state, n)
         low, high = max(0, i - (n >> halvings)), min(n, i + (n >> halvings) + 1)
-        state, ahead = draw(state, high - low)
+        state, ahead = draw_fast(state, high - low)
         j = low + ahead
         if abs(nus[i] * nus[j] + nvs[i] * nvs[j] + nds[i] * nds[j]) < MIN_PAIR_COS:
             return state, i, j

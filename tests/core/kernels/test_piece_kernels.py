@@ -168,11 +168,12 @@ def test_that_half_of_the_weight_is_below_the_weighted_median(rng):
     assert weights[values < median].sum() < weights.sum() / 2 <= weights[values <= median].sum()
 
 
-def test_that_draws_are_below_their_bound_and_even():
+@pytest.mark.parametrize("draw", [draws.draw, draws.draw_fast])
+def test_that_draws_are_below_their_bound_and_even(draw):
     state = draws.seeded(5)
     counts = np.zeros(7, int)
     for _ in range(7000):
-        state, i = draws.draw(state, 7)
+        state, i = draw(state, 7)
         counts[i] += 1
     assert abs(counts - 1000).max() < 150
     assert draws.seeded(5) != draws.seeded(6)
