@@ -1,11 +1,12 @@
 """Running a kernel over chunks of its items in threads, with progress and cancel."""
 
 import os
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
 from queue import Empty, SimpleQueue
 from threading import Event
+from typing import Any
 
 from pipecore.errors import CancelledError
 from pipecore.progress import Progress
@@ -97,3 +98,20 @@ def for_items(
             is_over.set()
             pool.shutdown(cancel_futures=True)
             raise
+
+
+@contextmanager
+def pool() -> Iterator[ThreadPoolExecutor]:
+    """As many threads as kernels may use; what has not begun is dropped at the end."""
+    executor = ThreadPoolExecutor(_n_threads)
+    try:
+        yield executor
+    finally:
+        executor.shutdown(cancel_futures=True)
+
+
+def wait_for(work: Future[Any], stage: str, progress: Progress, fraction: float) -> None:
+    """Wait until some work is done, with progress and cancel."""
+    progress.update(stage, fraction)
+    while not wait([work], HEARTBEAT).done:
+        progress.update(stage, fraction)
