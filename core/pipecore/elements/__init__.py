@@ -12,7 +12,7 @@ from pipecore.elements.keeping import refine_pieces
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import Piece, find_pieces
 from pipecore.elements.refine import Fitted
-from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_tangent
+from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_reducer, trim_to_tangent
 from pipecore.elements.surfaces import ArcSurface, LineSurface
 from pipecore.elements.tees import Junction, Part, cut_tees, find_junctions
 from pipecore.geometry import ArcAxis, LineAxis
@@ -140,13 +140,13 @@ def _trimmed_to_fitting(
     """A straight and the fitting at its nearer end, cut where one takes over from the other."""
     if not isinstance(straight, LineAxis):
         return straight, fitting
+    if isinstance(fitting, LineAxis):
+        return trim_to_reducer(straight, fitting), fitting
     middle = fitting.at(fitting.length / 2)
     end = int(np.linalg.norm(straight.end - middle) < np.linalg.norm(straight.start - middle))
-    if isinstance(fitting, ArcAxis):
-        corner = straight.at((fitting.centre - straight.start) @ straight.direction)
-        arc_end = int(np.linalg.norm(fitting.end - corner) < np.linalg.norm(fitting.start - corner))
-        return trim_to_tangent(straight, end, fitting, arc_end, 0.5 * straight.length)
-    return straight, fitting
+    corner = straight.at((fitting.centre - straight.start) @ straight.direction)
+    arc_end = int(np.linalg.norm(fitting.end - corner) < np.linalg.norm(fitting.start - corner))
+    return trim_to_tangent(straight, end, fitting, arc_end, 0.5 * straight.length)
 
 
 def _trimmed(

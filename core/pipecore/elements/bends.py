@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import bends as kernels
 from pipecore.elements.extent import Extent, find_extent, section_misfit
-from pipecore.elements.fittings import End, StraightEnd, straight_ends
+from pipecore.elements.fittings import End, StraightEnd, lean_of, straight_ends
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.refine import RADIAL_COS, Fitted, axis_through
 from pipecore.elements.surfaces import (
@@ -358,11 +358,3 @@ def _fitted(
     covariance[5, 5], covariance[6, 6] = sds[0] ** 2, sds[1] ** 2
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
     return Fitted(fit, axis, own, extent, misfit)
-
-
-def lean_of(normals: Array, outward: Array, tangent: Array) -> Array:
-    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
-    clockwise = np.cross(tangent, outward)
-    ahead = np.einsum("ij,ij->i", normals, clockwise)
-    out = np.einsum("ij,ij->i", normals, outward)
-    return np.asarray(np.arctan(ahead / np.where(out == 0.0, np.inf, out)))

@@ -7,11 +7,12 @@ from pipecore.elements.ahead import refine_in_turn
 from pipecore.elements.bends import Corner, corner_between, find_corners, fit_bend
 from pipecore.elements.corners import is_rounded_corner
 from pipecore.elements.credible import is_credible
-from pipecore.elements.fittings import End, propose_reducers, straight_ends
+from pipecore.elements.fittings import End, straight_ends
 from pipecore.elements.flanges import find_flanges
 from pipecore.elements.following import follow_end
 from pipecore.elements.nearby import NearbyPoints
 from pipecore.elements.pieces import LONG_PIECE, Piece
+from pipecore.elements.reducers import find_steps, fit_reducer
 from pipecore.elements.refine import Fitted, refine_piece
 from pipecore.elements.surfaces import LineSurface, SphereSurface
 from pipecore.progress import Progress
@@ -41,15 +42,15 @@ def refine_pieces(
     for corner, bend_radius, ends in find_corners(joinable, nearby, progress, (0.65, 0.67)):
         progress.update("elements", 0.67)
         keeper.try_bend(corner, bend_radius, ends)
-    for piece, ends in propose_reducers(joinable):
-        keeper.try_piece(piece, between=ends)
+    keeper.try_reducers()
     keeper.follow_open_ends(progress)
     for ring in find_flanges(list(keeper.fitted), nearby, keeper.is_free):
         progress.update("elements", 0.7)
         keeper.keep(ring)
     keeper.try_pieces(put_off + rest, progress, (0.7, 0.95))
+    keeper.try_reducers()  # also between what has been found since
     progress.update("elements", 1.0)
-    return keeper.fitted, keeper.links
+    return keeper.result()
 
 
 def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece], list[Piece]]:
@@ -81,6 +82,7 @@ class _Keeper:
         self._settings = settings
         self.links: list[tuple[int, int]] = []
         self._joined: set[End] = set()
+        self._replaced: set[int] = set()
 
     def try_pieces(
         self,
@@ -119,6 +121,26 @@ class _Keeper:
         if usable is not None:
             found = fit_bend(corner, bend_radius, self._nearby, usable)
             self._keep_if_it_holds(found, between)
+
+    def try_reducers(self) -> None:
+        """Fit reducers between straights on one line and keep those that hold.
+
+        A straight that was found in the side of one gives way to it.
+        """
+        for step in find_steps(self.fitted):
+            between = step.one.which, step.other.which
+            usable = self._usable(between)
+            if usable is None:
+                continue
+            inner = [i for i, f in enumerate(self.fitted) if step.has_between(f)]
+            inner = [i for i in inner if self._joined.isdisjoint({(i, 0), (i, 1)})]
+            for i in inner:
+                usable[self.fitted[i].own] = True
+            straights = self.fitted[between[0][0]], self.fitted[between[1][0]]
+            found = fit_reducer(step, straights, self._nearby, usable)
+            if self._keep_if_it_holds(found, between):
+                self._joined |= {(i, end) for i in inner for end in (0, 1)}
+                self._replaced.update(inner)
 
     def follow_open_ends(self, progress: Progress) -> None:
         """Look for a bend, and the straight beyond it, where nothing joins a straight yet."""
@@ -174,11 +196,13 @@ class _Keeper:
 
     def _keep_if_it_holds(
         self, found: Fitted | None, between: tuple[End, ...] | None = None
-    ) -> None:
+    ) -> bool:
         if found is None or not is_credible(found, self._nearby.surface, self._settings):
-            return
-        if not is_rounded_corner(found, self._nearby):
-            self.keep(found, between)
+            return False
+        if is_rounded_corner(found, self._nearby):
+            return False
+        self.keep(found, between)
+        return True
 
     def keep(self, found: Fitted, between: tuple[End, ...] | None = None) -> None:
         """Keep what holds; its points are taken, and the ends that it joins."""
@@ -187,3 +211,10 @@ class _Keeper:
             self.links += [(len(self.fitted), i) for i, _ in between]
         self.is_free[found.own] = False
         self.fitted.append(found)
+
+    def result(self) -> tuple[list[Fitted], list[tuple[int, int]]]:
+        """The pieces and links, without those that gave way to others."""
+        left = [i for i in range(len(self.fitted)) if i not in self._replaced]
+        number = {i: k for k, i in enumerate(left)}
+        links = [(number[a], number[b]) for a, b in self.links if {a, b} <= number.keys()]
+        return [self.fitted[i] for i in left], links

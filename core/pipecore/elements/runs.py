@@ -125,3 +125,21 @@ def trim_to_tangent(
         LineAxis(line.at(low), line.direction, high - low),
         ArcAxis(arc.centre, arc.normal, turned, arc.bend_radius, last - first),
     )
+
+
+def trim_to_reducer(line: LineAxis, reducer: LineAxis) -> LineAxis:
+    """End a straight where a reducer on its line begins.
+
+    Nothing changes if that place is further from its end than the reducer is long, so that
+    what is hidden of it stays so.
+    """
+    low, high = sorted(
+        float((end - line.start) @ line.direction) for end in (reducer.start, reducer.end)
+    )
+    is_ahead = low + high > line.length
+    place = low if is_ahead else high
+    change = abs(place - (line.length if is_ahead else 0.0))
+    if change > reducer.length:
+        return line
+    first, last = (0.0, place) if is_ahead else (place, line.length)
+    return LineAxis(line.at(first), line.direction, last - first) if last > first else line

@@ -5,7 +5,14 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore.elements.extent import find_extent, section_misfit, turning_by_row
-from pipecore.elements.runs import Lines, Span, meeting_ends, number_runs, trim_to_tangent
+from pipecore.elements.runs import (
+    Lines,
+    Span,
+    meeting_ends,
+    number_runs,
+    trim_to_reducer,
+    trim_to_tangent,
+)
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
 
@@ -242,3 +249,23 @@ def test_that_lines_near_a_place_are_those_that_pass_it(rng):
         n_found += len(expected)
     assert n_found > 20
     assert Lines([]).near(np.zeros(3), np.empty(0)) == []
+
+
+@pytest.mark.parametrize("at_start", [False, True])
+@pytest.mark.parametrize("short", [-0.03, 0.0, 0.04])
+def test_that_a_straight_ends_where_the_reducer_on_its_line_begins(rng, at_start, short):
+    origin, direction = rng.uniform(-2, 2, 3), random_direction(rng)
+    pipe = LineAxis(origin, direction, 1.0)
+    reducer = LineAxis(pipe.at(1.0 + short), direction, 0.15)
+    if rng.uniform() < 0.5:
+        reducer = reducer.reversed()
+    trimmed = trim_to_reducer(pipe.reversed() if at_start else pipe, reducer)
+    near, far = (trimmed.start, trimmed.end) if at_start else (trimmed.end, trimmed.start)
+    assert_allclose(near, pipe.at(1.0 + short), atol=1e-12)
+    assert_allclose(far, pipe.start, atol=1e-12)
+
+
+def test_that_a_straight_that_is_hidden_up_to_its_reducer_stays_as_it_was_seen(rng):
+    pipe = LineAxis(rng.uniform(-2, 2, 3), random_direction(rng), 1.0)
+    reducer = LineAxis(pipe.at(1.4), pipe.direction, 0.15)
+    assert trim_to_reducer(pipe, reducer) is pipe
