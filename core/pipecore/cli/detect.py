@@ -32,8 +32,8 @@ def run(args: argparse.Namespace, console: Console) -> None:
         parallel.set_threads(args.threads)
     if not is_compiled():
         console.note(
-            "The first detection on a machine compiles its kernels, which takes half a minute or "
-            "more; later ones do without."
+            "The first detection on a machine compiles its kernels, which takes one to three "
+            "minutes; later ones do without."
         )
 
     with _detected(args, settings, console) as (cloud, result):

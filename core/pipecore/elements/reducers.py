@@ -27,6 +27,8 @@ ON_AXIS, MAX_LEAN = 0.12, np.deg2rad(6.0)
 lean to each other by no more than this angle."""
 NARROWEST, WIDEST = 0.4, 0.96
 """Radii of the narrow end, in those of the wide one."""
+MIN_PIPE = 1.5
+"""Straights that a reducer joins are longer than this many radii."""
 SHORTEST, LONGEST, WIDEST_GAP = 0.1, 5.0, 12.0
 """Lengths of a reducer, and the widest gap between straights that it may join, with what is
 hidden of them, in radii of its wider end."""
@@ -52,7 +54,13 @@ def find_steps(fitted: list[Fitted]) -> list["Step"]:
 
     What lies between two is then known before it may be taken for a straight itself.
     """
-    return sorted(_steps(straight_ends(fitted)), key=lambda step: -step.gap)
+    ends = [e for e in straight_ends(fitted) if _is_pipe(fitted[e.which[0]])]
+    return sorted(_steps(ends), key=lambda step: -step.gap)
+
+
+def _is_pipe(straight: Fitted) -> bool:
+    """Whether a straight is longer than a flange or the end of something else."""
+    return straight.axis.length > MIN_PIPE * straight.fit.model.radius
 
 
 def _steps(ends: list[StraightEnd]) -> Iterator["Step"]:

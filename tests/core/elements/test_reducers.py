@@ -131,6 +131,8 @@ def test_that_only_straights_on_one_line_and_of_different_radii_make_steps(rng):
     assert steps_to(1.2 * along + 0.04 * across, along, 0.07) == []
     assert steps_to(1.2 * along, unit(along + 0.2 * across), 0.07) == []
     assert steps_to(3.0 * along, along, 0.07) == []
+    flange = straight(LineAxis(origin + 1.0 * along, along, 0.05), 0.16)
+    assert find_steps([pipe, flange]) == []
 
 
 def test_that_the_furthest_steps_come_first(rng):
