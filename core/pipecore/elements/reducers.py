@@ -43,6 +43,8 @@ FACING = np.cos(np.deg2rad(50.0))
 """Points whose normals are further from a radius of the pipe are of something else."""
 MIN_POINTS, MOST_POINTS = 12, 1500
 """Points on a reducer at least, and how many tell at most where it begins and ends."""
+LEAST_SIGMA = 0.0005
+"""Points are not believed to scatter less than this about a cone, metres."""
 MIN_SHARE = 0.6
 """Of the points between the radii of both straights so many lie on a reducer."""
 FREE_SD = 0.006
@@ -198,19 +200,20 @@ def fit_reducer(
         is as sure as those of the straights.
     """
     before, after = (min(OVERSHOOT * step.wide, 0.5 * s.axis.length) for s in straights)
-    around = LineAxis(step.one.point, step.direction, step.gap)
-    points = nearby.thinned(around, step.wide, max(before, after))
+    low, high = -before, step.gap + after
+    if high - low < SHORTEST * step.wide:
+        return None
+    around = LineAxis(step.one.point + low * step.direction, step.direction, high - low)
+    points = nearby.thinned(around, step.wide, 0.0)
     xyz = nearby.surface.xyz[points]
     chainage, rho, _ = around.pipe_coordinates(xyz)
     outward = (xyz - around.at(chainage)) / rho[:, None]
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[points], outward))
-    low, high = -before, step.gap + after
-    chosen = usable[points] & (cosine > FACING) & (chainage > low) & (chainage < high)
+    chosen = usable[points] & (cosine > FACING)
     points, xyz = points[chosen], xyz[chosen]
     if len(points) < MIN_POINTS:
         return None
-    sigma = max(nearby.surface.noise, 0.001)
-    band = max(5.0 * sigma, 0.0025)
+    band = max(5.0 * nearby.surface.noise, 0.005)
     sample = xyz[np.linspace(0, len(xyz) - 1, min(len(xyz), MOST_POINTS)).astype(np.intp)]
     begin, end = _best_ends(step, sample, low, high, band)
     return _fitted(step, begin, end, straights, nearby, points, band)
@@ -218,16 +221,17 @@ def fit_reducer(
 
 def _best_ends(step: Step, xyz: Array, low: float, high: float, band: float) -> tuple[float, float]:
     """Chainages between which the cone leaves least of the points' distances."""
+    best = (np.inf, low, high)
     begins = ends = np.linspace(low, high, N_TRIED)
-    best = (np.inf, 0.0, step.gap)
     for _ in range(2):
         for begin in begins:
             lengths = (ends - begin) / step.wide
             possible = ends[(lengths > SHORTEST) & (lengths < LONGEST)]
+            if len(possible) == 0:
+                continue
             left = np.square(np.minimum(step.off(xyz, begin, possible), band)).sum(axis=1)
-            if len(left) > 0:
-                least = int(np.argmin(left))
-                best = min(best, (float(left[least]), float(begin), float(possible[least])))
+            least = int(np.argmin(left))
+            best = min(best, (float(left[least]), float(begin), float(possible[least])))
         beside = (high - low) / (N_TRIED - 1) * np.linspace(-1.0, 1.0, 9)
         begins, ends = best[1] + beside, best[2] + beside
     return best[1], best[2]
@@ -252,7 +256,7 @@ def _fitted(
     beside = between & (rho > step.narrow - band) & (rho < step.wide + band)
     if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
         return None
-    own, sigma = points[on], robust_sigma(residual[on])
+    own, sigma = points[on], max(robust_sigma(residual[on]), LEAST_SIGMA)
     lean = lean_of(normals[on], outward[on], axis.tangent(chainage[on]))
     extent = find_extent(
         chainage[on], clock[on], residual[on], lean, lambda *_: np.empty((2, 0)),
