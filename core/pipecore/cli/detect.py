@@ -1,6 +1,8 @@
 """``pipecore detect``."""
 
 import argparse
+import importlib
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,6 +38,9 @@ def run(args: argparse.Namespace, console: Console) -> None:
             "minutes; later ones do without."
         )
 
+    # What draws figures takes as long to import as to draw some; kernels leave time for it.
+    ahead = "pipecore.report.html", "pipecore.report.figures"
+    threading.Thread(target=lambda: list(map(importlib.import_module, ahead)), daemon=True).start()
     with _detected(args, settings, console) as (cloud, result):
         write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
 

@@ -10,7 +10,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from pipecore.ellipses.direct import fit_direct_ellipses
 from pipecore.ellipses.distances import (
@@ -291,6 +290,8 @@ def _descend(
 
     def jacobian(parameters: Array) -> Array:
         return root[:, None] * model(points, parameters)[1]
+
+    from scipy.optimize import least_squares  # noqa: PLC0415 - slow to import, seldom used
 
     solution = least_squares(
         residuals, first, jacobian, method="lm", xtol=1e-9, ftol=1e-12, max_nfev=max_evaluations
