@@ -43,16 +43,16 @@ test-gui: venv
 study: venv ## Measure the accuracy on simulated scans (half an hour; writes docs/accuracy.md)
 	@# A peer to compare with, of no use to anything else here.
 	$(PYTHON) -m pip install --quiet cylinder-fitting==1.1.4
-	$(PYTHON) -m tests.study
+	$(PYTHON) -m tools.study
 
 bench: venv ## Measure time and memory (writes docs/performance.md)
-	$(PYTHON) -m tests.bench
+	$(PYTHON) -m tools.bench
 
 pictures: venv ## Take the pictures of README and guide anew
-	$(WINDOWED) $(PYTHON) -m tests.pictures
+	$(WINDOWED) $(PYTHON) -m tools.pictures
 
 texts: venv ## Bring the translations up to the sources, and compile them
-	$(PYTHON) -m tests.catalogue
+	$(PYTHON) -m tools.translations
 
 format: venv ## Lay out the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix
@@ -73,4 +73,4 @@ system-packages:
 
 clean: ## Remove everything that was made here, but for the environment
 	rm -rf out build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis
-	find core pipegui tests -name __pycache__ -prune -exec rm -rf {} +
+	find core pipegui tests tools -name __pycache__ -prune -exec rm -rf {} +

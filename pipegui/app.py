@@ -22,12 +22,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from PySide6.QtCore import QSettings  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
-    from pipegui import theme  # noqa: PLC0415
-    from pipegui.crash_guard import CrashGuard  # noqa: PLC0415
-    from pipegui.jobs import Jobs  # noqa: PLC0415
-    from pipegui.main_window import MainWindow  # noqa: PLC0415
-    from pipegui.parts import make_parts  # noqa: PLC0415
-    from pipegui.warming import Warming  # noqa: PLC0415
+    from pipegui.style import theme  # noqa: PLC0415
+    from pipegui.window.main_window import MainWindow  # noqa: PLC0415
+    from pipegui.window.views import make_parts  # noqa: PLC0415
+    from pipegui.work.crash_guard import CrashGuard  # noqa: PLC0415
+    from pipegui.work.job_queue import Jobs  # noqa: PLC0415
+    from pipegui.work.kernel_warmup import Warming  # noqa: PLC0415
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
@@ -74,7 +74,7 @@ def _speak(app: "QApplication", chosen: str) -> None:
     """Choose the language of all texts, Qt's own too; numbers keep the decimal point."""
     from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator  # noqa: PLC0415
 
-    from pipegui import texts  # noqa: PLC0415
+    from pipegui.i18n import texts  # noqa: PLC0415
 
     texts.use_language(chosen, QLocale.system().uiLanguages()[0])
     QLocale.setDefault(QLocale.c())

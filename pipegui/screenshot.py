@@ -6,7 +6,7 @@ from pathlib import Path
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QImage
 
-from pipegui.main_window import MainWindow
+from pipegui.window.main_window import MainWindow
 
 LOOK_AGAIN_MS = 700
 PATIENCE = 40

@@ -7,11 +7,12 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QToolButton, QWidget
 
-from pipegui import describe, theme
-from pipegui.document import Box
+from pipegui.i18n.texts import mark, tr
+from pipegui.model.document import Box
 from pipegui.panels.widgets import Applying, QuietSpinBox
-from pipegui.texts import mark, tr
-from pipegui.view_state import ClipState
+from pipegui.states import descriptions
+from pipegui.states.view_state import ClipState
+from pipegui.style import theme
 
 STEP = 0.05
 FIELD_FRAME, BUTTON_FRAME, ICON_FRAME = 12, 18, 8
@@ -88,7 +89,7 @@ class ClipBar(QWidget):
         self._origin = state.cloud.origin
         self.invert.setChecked(state.box.is_inverted)
         with self._applying:
-            for axis, name in enumerate(describe.axis_names(state.cloud)):
+            for axis, name in enumerate(descriptions.axis_names(state.cloud)):
                 self._names[axis].setText(name)
                 for side, local in enumerate((state.box.low, state.box.high)):
                     field = self.ends[axis][side]

@@ -4,10 +4,10 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
 from pipecore.settings import ProfileMethod
-from pipegui import theme
+from pipegui.i18n.texts import first_capital, tr
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
-from pipegui.texts import first_capital, tr
-from pipegui.view_state import StacksState
+from pipegui.states.view_state import StacksState
+from pipegui.style import theme
 
 
 class CuttingFields(QWidget):

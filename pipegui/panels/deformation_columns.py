@@ -14,8 +14,8 @@ from pipecore.report.format import (
 from pipecore.report.summary import VERDICT_ORDER
 from pipecore.rules import outside_diameter
 from pipecore.types import Deformation, Element, Result, Review, ReviewState
-from pipegui.reasons import reason_text
-from pipegui.texts import format_measure, label_of, mark, tr
+from pipegui.i18n.reason_texts import reason_text
+from pipegui.i18n.texts import format_measure, label_of, mark, tr
 
 REVIEW_ORDER = tuple(ReviewState)
 

@@ -7,10 +7,10 @@ from PySide6.QtCore import QEvent, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from pipecore.types import DeformationKind, ReviewState, Verdict
-from pipegui import theme
+from pipegui.i18n.texts import mark, tr
 from pipegui.panels.deformation_model import REVIEW_ICON
 from pipegui.panels.widgets import QuietComboBox, QuietSpinBox
-from pipegui.texts import mark, tr
+from pipegui.style import theme
 
 TIPS = {
     "kind": (mark("Show only deformations of one kind"), mark("All kinds")),

@@ -18,9 +18,9 @@ from PySide6.QtCore import (
 from pipecore.report.format import NOT_MEASURABLE
 from pipecore.report.summary import by_verdict
 from pipecore.types import Deformation, DeformationKind, Result, Review, ReviewState, Verdict
-from pipegui import theme
+from pipegui.i18n.texts import tr
 from pipegui.panels.deformation_columns import COLUMNS, INDEX, Row
-from pipegui.texts import tr
+from pipegui.style import theme
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole

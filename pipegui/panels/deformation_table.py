@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.types import ReviewState
-from pipegui import describe, theme
+from pipegui.i18n.texts import mark, tr
 from pipegui.panels.deformation_columns import COLUMNS, INDEX
 from pipegui.panels.deformation_filters import FilterBar
 from pipegui.panels.deformation_model import (
@@ -28,8 +28,9 @@ from pipegui.panels.deformation_model import (
 )
 from pipegui.panels.table_columns import TableColumns
 from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
-from pipegui.texts import mark, tr
-from pipegui.view_state import TableState
+from pipegui.states import descriptions
+from pipegui.states.view_state import TableState
+from pipegui.style import theme
 
 WAITING = mark(
     "Dents, bulges and other deformations appear here once pipes are detected.\n"
@@ -192,7 +193,7 @@ class DeformationTable(QWidget):
             if len(rows) == n_rows
             else tr("{n} of {total} shown").format(n=len(rows), total=n_rows)
         ]
-        parts += describe.to_do(verdicts)
+        parts += descriptions.to_do(verdicts)
         n_open = sum(self.model.review(r).state is ReviewState.OPEN for r in rows)
         if n_open < len(rows):
             parts.append(tr("{n} open").format(n=n_open))

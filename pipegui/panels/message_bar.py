@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import theme
-from pipegui.texts import tr
+from pipegui.i18n.texts import tr
+from pipegui.style import theme
 
 _ICONS = {
     "info": ("check-circle-outline", "accent"),

@@ -13,10 +13,10 @@ from PySide6.QtWidgets import (
 
 from pipecore.errors import PipecoreError
 from pipecore.settings import Settings
-from pipegui import theme
+from pipegui.i18n.texts import error_text, mark, tr
+from pipegui.model.presets import Preset, Presets
 from pipegui.panels.widgets import QuietComboBox
-from pipegui.presets import Preset, Presets
-from pipegui.texts import error_text, mark, tr
+from pipegui.style import theme
 
 NONE_OF_THEM = mark("Own settings")
 TOOL_TIP = Qt.ItemDataRole.ToolTipRole

@@ -4,10 +4,10 @@ import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSlider, QToolButton, QWidget
 
-from pipegui import theme
+from pipegui.i18n.texts import tr
 from pipegui.panels.widgets import Applying
-from pipegui.texts import tr
-from pipegui.view_state import ProfileBarState
+from pipegui.states.view_state import ProfileBarState
+from pipegui.style import theme
 
 
 class ProfileBar(QWidget):

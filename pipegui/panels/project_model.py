@@ -18,10 +18,11 @@ from PySide6.QtGui import QFont, QIcon
 
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Deformation, Element, Result
-from pipegui import describe, theme
-from pipegui.document import Scan, Selection
-from pipegui.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
-from pipegui.view_state import TreeState
+from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
+from pipegui.model.document import Scan, Selection
+from pipegui.states import descriptions
+from pipegui.states.view_state import TreeState
+from pipegui.style import theme
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
@@ -113,7 +114,7 @@ class ProjectModel(QAbstractItemModel):
         hint = str(scan.cloud.source or scan.name)
         node = _Node(NodeKind.SCAN, self._root, index, NO_ID, scan.name)
         node.icon = "scatter-plot-outline"
-        node.hint = f"{hint}\n{describe.point_count(len(scan.cloud))}"
+        node.hint = f"{hint}\n{descriptions.point_count(len(scan.cloud))}"
         self._add(node)
         if result is None:
             return
@@ -159,7 +160,7 @@ class ProjectModel(QAbstractItemModel):
     def _add_deformation(self, parent: _Node, deformation: Deformation, result: Result) -> None:
         element = result.element(deformation.element_id)
         node = _Node(NodeKind.DEFORMATION, parent, parent.scan_index, deformation.deformation_id)
-        name = describe.deformation_name(deformation)
+        name = descriptions.deformation_name(deformation)
         node.text = f"{name} · {label_of(element)}"
         node.badge = (deformation,)
         self._add(node)

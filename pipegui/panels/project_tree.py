@@ -19,12 +19,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import theme
-from pipegui.document import Selection
+from pipegui.i18n.texts import tr
+from pipegui.model.document import Selection
 from pipegui.panels.project_model import BADGE, NAME, RADIUS, NodeKind, ProjectModel
 from pipegui.panels.widgets import Applying, EmptyHint
-from pipegui.texts import tr
-from pipegui.view_state import TreeState
+from pipegui.states.view_state import TreeState
+from pipegui.style import theme
 
 __all__ = ["NodeKind", "ProjectTree"]
 

@@ -11,11 +11,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import theme
-from pipegui.describe import Heading, properties
+from pipegui.i18n.texts import tr
 from pipegui.panels.widgets import EmptyHint
-from pipegui.texts import tr
-from pipegui.view_state import PropertiesState
+from pipegui.states.descriptions import Heading, properties
+from pipegui.states.view_state import PropertiesState
+from pipegui.style import theme
 
 
 class PropertiesPanel(QWidget):

@@ -18,10 +18,10 @@ from PySide6.QtWidgets import (
 
 from pipecore.rules import list_rules
 from pipecore.settings import FieldSpec, Settings, iterate_fields
-from pipegui import theme
+from pipegui.i18n.texts import mark, tr
 from pipegui.panels.preset_bar import PresetBar
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
-from pipegui.texts import mark, tr
+from pipegui.style import theme
 
 ELSEWHERE = {"stacks.preset", "stacks.directions"} | {
     key for key, spec in iterate_fields() if spec.group == "tiling"

@@ -7,9 +7,9 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QWidget
 
 from pipecore.geometry import Array
-from pipegui import theme
+from pipegui.i18n.texts import tr
 from pipegui.panels.widgets import QuietSpinBox
-from pipegui.texts import tr
+from pipegui.style import theme
 
 
 class StackEditor(QWidget):

@@ -20,13 +20,13 @@ from PySide6.QtWidgets import (
 
 from pipecore.settings import DirectionPreset
 from pipecore.types import NO_ID, Stack
-from pipegui import theme
+from pipegui.i18n.texts import mark, tr
 from pipegui.panels.cutting_fields import CuttingFields
 from pipegui.panels.stack_editor import StackEditor
 from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
-from pipegui.plan_state import PlanState
-from pipegui.texts import mark, tr
-from pipegui.view_state import StacksState
+from pipegui.states.preview_state import PlanState
+from pipegui.states.view_state import StacksState
+from pipegui.style import theme
 
 PRESET_TEXT = {
     DirectionPreset.AUTOMATIC: mark("Automatic"),

@@ -3,10 +3,11 @@
 from PySide6.QtCore import QTimer, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QStatusBar, QToolButton, QWidget
 
-from pipegui import describe, theme
-from pipegui.texts import tr
-from pipegui.view_state import WindowState
-from pipegui.worker import Progressed
+from pipegui.i18n.texts import tr
+from pipegui.states import descriptions
+from pipegui.states.view_state import WindowState
+from pipegui.style import theme
+from pipegui.work.worker import Progressed
 
 STEPS = 1000
 """Of the progress bar."""
@@ -59,7 +60,7 @@ class StatusBar(QStatusBar):
             self.cursor_position.clear()
             return
         cloud = state.scan.cloud
-        parts = [describe.point_count(len(cloud)), *([cloud.crs] if cloud.crs else [])]
+        parts = [descriptions.point_count(len(cloud)), *([cloud.crs] if cloud.crs else [])]
         self.scan.setText(" · ".join(parts))
 
     def start(self, title: str) -> None:

@@ -7,10 +7,10 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QTableView
 
-from pipegui import theme
+from pipegui.i18n.texts import tr
 from pipegui.panels.deformation_columns import COLUMNS, EXPENDABLE, INDEX, SHOWN_FIRST
 from pipegui.panels.widgets import Applying
-from pipegui.texts import tr
+from pipegui.style import theme
 
 ROOM = {"review": 12 * theme.SPACING, "comment": 12 * theme.SPACING}
 """Least widths of the columns that are still to be filled, in pixels."""

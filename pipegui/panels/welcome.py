@@ -4,8 +4,8 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from pipecore.io import formats
-from pipegui import theme
-from pipegui.texts import tr
+from pipegui.i18n.texts import tr
+from pipegui.style import theme
 
 
 class Welcome(QWidget):

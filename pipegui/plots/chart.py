@@ -15,10 +15,10 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import theme
+from pipegui.i18n.texts import mark, tr
 from pipegui.plots.export import Table, png, to_csv, to_image, to_svg, to_tsv
-from pipegui.texts import mark, tr
-from pipegui.theme import SPACING
+from pipegui.style import theme
+from pipegui.style.theme import SPACING
 
 SAVED_AS = {
     "png": mark("Save as PNG…"),

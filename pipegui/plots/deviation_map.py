@@ -9,15 +9,15 @@ from PySide6.QtWidgets import QGraphicsEllipseItem, QGraphicsRectItem, QWidget
 from pipecore.geometry import Array
 from pipecore.report.format import format_clock
 from pipecore.types import Deformation, DeformationKind
-from pipegui import theme
-from pipegui.colour_maps import DEVIATION, deviation_colours
-from pipegui.colours import VERDICT
+from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart
 from pipegui.plots.export import Table
 from pipegui.plots.unrolled import Unrolled, from_clock, unroll
-from pipegui.texts import format_measure, label_of, mark, tr
-from pipegui.theme import SPACING
-from pipegui.view_state import MapState
+from pipegui.states.view_state import MapState
+from pipegui.style import theme
+from pipegui.style.colour_maps import DEVIATION, deviation_colours
+from pipegui.style.colours import VERDICT
+from pipegui.style.theme import SPACING
 
 EMPTY = mark("Select an element to see its surface unrolled.")
 DEGREES = ((-180, "6:00"), (-90, "9:00"), (0, "12:00"), (90, "3:00"), (180, "6:00"))

@@ -7,10 +7,10 @@ import numpy as np
 from pipecore.geometry import Array
 from pipecore.report.format import format_clock
 from pipecore.types import Profiles
+from pipegui.i18n.reason_texts import reason_text
+from pipegui.i18n.texts import format_measure, mark, tr
 from pipegui.plots.exaggeration import deviations
-from pipegui.reasons import reason_text
-from pipegui.section_cut import Ellipse, SectionCut
-from pipegui.texts import format_measure, mark, tr
+from pipegui.states.section import Ellipse, SectionCut
 
 TELLING = 3.0
 """A deviation is a dimension if it is this many times its standard deviation."""

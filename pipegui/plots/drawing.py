@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor, QFont
 
 from pipecore.geometry import Array
-from pipegui import theme
 from pipegui.plots.chart import faint
+from pipegui.style import theme
 
 POINT_PX = 6
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipecore.geometry import Array
-from pipegui.section_cut import Ellipse
+from pipegui.states.section import Ellipse
 
 
 def ellipse_points(ellipse: Ellipse, n: int = 181) -> Array:

@@ -11,8 +11,8 @@ from PySide6.QtGui import QImage, QPainter, QTextDocument
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QGraphicsScene
 
-from pipegui import theme
-from pipegui.theme import SPACING
+from pipegui.style import theme
+from pipegui.style.theme import SPACING
 
 Table = Mapping[str, Sequence[str]]
 """Columns of cells by their titles, all of one length."""

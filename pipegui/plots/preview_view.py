@@ -10,15 +10,15 @@ from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
 from pipecore.geometry import Array
 from pipecore.report.format import cell
-from pipegui import theme
-from pipegui.colour_maps import QUALITATIVE
-from pipegui.plan_state import PreviewState
+from pipegui.i18n.texts import count, mark, tr
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.exaggeration import ellipse_points
 from pipegui.plots.export import Table
 from pipegui.plots.section_view import FAR, STEPS
-from pipegui.section_cut import Ellipse
-from pipegui.texts import count, mark, tr
+from pipegui.states.preview_state import PreviewState
+from pipegui.states.section import Ellipse
+from pipegui.style import theme
+from pipegui.style.colour_maps import QUALITATIVE
 
 if TYPE_CHECKING:
     from pipecore.preview import ProfilePreview

@@ -9,14 +9,14 @@ from PySide6.QtGui import QColor
 from pipecore.geometry import Array
 from pipecore.report.format import cell
 from pipecore.types import Element, Profiles
-from pipegui import theme
-from pipegui.colour_maps import QUALITATIVE
-from pipegui.colours import VERDICT
-from pipegui.cuts import DentLimit
+from pipegui.i18n.texts import format_measure, label_of, tr
+from pipegui.model.result_queries import DentLimit
 from pipegui.plots.chart import faint
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import Pattern
-from pipegui.texts import format_measure, label_of, tr
+from pipegui.style import theme
+from pipegui.style.colour_maps import QUALITATIVE
+from pipegui.style.colours import VERDICT
 
 
 @dataclass(frozen=True, eq=False)

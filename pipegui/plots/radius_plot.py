@@ -17,18 +17,18 @@ from PySide6.QtWidgets import (
 
 from pipecore.geometry import Array
 from pipecore.types import Element, Profiles
-from pipegui import theme
-from pipegui.colour_maps import QUALITATIVE
-from pipegui.colours import VERDICT
-from pipegui.document import ProfileKey
+from pipegui.i18n.texts import format_measure, label_of, mark, tr
+from pipegui.model.document import ProfileKey
 from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, small
 from pipegui.plots.export import Table
 from pipegui.plots.pattern import index_at, pattern_of
 from pipegui.plots.radius_curves import Curve, legend, range_of, row_text, table_of
 from pipegui.plots.series_menu import SeriesMenu
-from pipegui.texts import format_measure, label_of, mark, tr
-from pipegui.view_state import RadiusPlotState
+from pipegui.states.view_state import RadiusPlotState
+from pipegui.style import theme
+from pipegui.style.colour_maps import QUALITATIVE
+from pipegui.style.colours import VERDICT
 
 EMPTY = mark("Select an element to see its radius from profile to profile.")
 CLICK_PX = 20

@@ -12,16 +12,16 @@ from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 from pipecore.geometry import Array
 from pipecore.report.format import cell
 from pipecore.types import OWN_STACK
-from pipegui import theme
-from pipegui.colour_maps import QUALITATIVE
+from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensions_text
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
 from pipegui.plots.export import Table
 from pipegui.plots.series_menu import SeriesMenu
-from pipegui.section_cut import Ellipse, SectionCut
-from pipegui.texts import format_measure, label_of, mark, tr
-from pipegui.view_state import SectionState
+from pipegui.states.section import Ellipse, SectionCut
+from pipegui.states.view_state import SectionState
+from pipegui.style import theme
+from pipegui.style.colour_maps import QUALITATIVE
 
 EMPTY = mark("Select a profile to see its section: click a point of the radius plot or of the map.")
 MAX_FACTOR = 20

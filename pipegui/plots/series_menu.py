@@ -6,7 +6,7 @@ from PySide6.QtCore import QSignalBlocker, Signal
 from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QWidget
 
-from pipegui.texts import tr
+from pipegui.i18n.texts import tr
 
 
 class SeriesMenu(QMenu):

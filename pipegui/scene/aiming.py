@@ -9,7 +9,7 @@ from pipecore.types import Deformation, Element, ElementKind, Profiles
 from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.pose import VIEW_ANGLE, Pose
-from pipegui.view_state import SceneState
+from pipegui.states.view_state import SceneState
 
 ELEMENT_MARGIN = 1.6
 """Some of the surroundings help to see where an element is."""

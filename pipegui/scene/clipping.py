@@ -6,7 +6,7 @@ import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from pipecore.geometry import Array
-from pipegui.document import Box
+from pipegui.model.document import Box
 from pipegui.scene import shapes
 from pipegui.scene.projection import Projection
 

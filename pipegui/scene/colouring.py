@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
-from pipegui.colour_limits import height_limits, intensity_limits
-from pipegui.colour_maps import (
+from pipegui.model.colour_limits import height_limits, intensity_limits
+from pipegui.model.document import Box, ColourBy, ViewOptions
+from pipegui.scene.neighbours import colour_apart, neighbouring_ids
+from pipegui.style.colour_maps import (
     BLOCK,
     HEIGHT,
     INTENSITY,
@@ -20,9 +22,7 @@ from pipegui.colour_maps import (
     look_up,
     rgb,
 )
-from pipegui.colours import VERDICT
-from pipegui.document import Box, ColourBy, ViewOptions
-from pipegui.scene.neighbours import colour_apart, neighbouring_ids
+from pipegui.style.colours import VERDICT
 
 MUTED = {False: (217, 221, 227), True: (70, 76, 84)}
 """Points that the colouring says nothing about, on light and on dark background."""

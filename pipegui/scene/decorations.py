@@ -8,8 +8,7 @@ from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from pipecore.types import OWN_STACK, Element, Profiles
-from pipegui import theme
-from pipegui.document import Box, ColourBy
+from pipegui.model.document import Box, ColourBy
 from pipegui.scene import shapes
 from pipegui.scene.colouring import (
     effective,
@@ -19,7 +18,8 @@ from pipegui.scene.colouring import (
     visible_elements,
 )
 from pipegui.scene.point_layer import point_actor, set_planes
-from pipegui.view_state import SceneState
+from pipegui.states.view_state import SceneState
+from pipegui.style import theme
 
 MAX_HIGHLIGHTED = {False: 400_000, True: 20_000}
 """Points of the selected element that are drawn over the others, at rest and moving."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, Qt, Signal
 
 from pipecore.types import Floats
-from pipegui.colour_maps import BLOCK
 from pipegui.scene.projection import Projection
+from pipegui.style.colour_maps import BLOCK
 
 Mask = NDArray[np.bool_]
 Rows = NDArray[np.int32]

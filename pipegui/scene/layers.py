@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QPointF
 
 from pipecore.types import PointCloud
-from pipegui.colour_maps import Colours
-from pipegui.document import Box
+from pipegui.model.document import Box
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.details import Finder, Mask, rows_in_picture, rows_of
@@ -17,7 +16,8 @@ from pipegui.scene.picking import pick_point
 from pipegui.scene.point_layer import MOVING_LEVEL, PointLayer
 from pipegui.scene.projection import Projection
 from pipegui.scene.spreading import Spread
-from pipegui.view_state import SceneState
+from pipegui.states.view_state import SceneState
+from pipegui.style.colour_maps import Colours
 
 COLOURING = (
     "colour_by",

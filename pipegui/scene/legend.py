@@ -6,10 +6,9 @@ import numpy as np
 
 from pipecore.report.format import MINUS
 from pipecore.types import ElementKind, PointCloud, Result
-from pipegui.colour_limits import height_limits, intensity_limits, n_decimals
-from pipegui.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours, rgb
-from pipegui.colours import VERDICT
-from pipegui.document import ColourBy, Limits, ViewOptions
+from pipegui.i18n.texts import first_capital, mark, tr
+from pipegui.model.colour_limits import height_limits, intensity_limits, n_decimals
+from pipegui.model.document import ColourBy, Limits, ViewOptions
 from pipegui.scene.colouring import (
     KIND_COLOUR,
     NO_ELEMENT,
@@ -18,7 +17,8 @@ from pipegui.scene.colouring import (
     effective,
     stack_of,
 )
-from pipegui.texts import first_capital, mark, tr
+from pipegui.style.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours, rgb
+from pipegui.style.colours import VERDICT
 
 Swatch = tuple[tuple[int, int, int], str]
 

@@ -8,12 +8,12 @@ from PySide6.QtGui import QColor, QPainter, QPen
 
 from pipecore.report.format import MINUS
 from pipecore.types import PointCloud
-from pipegui.describe import axis_names, coordinate_lines
-from pipegui.document import Measurement
+from pipegui.i18n.texts import tr
+from pipegui.model.document import Measurement
 from pipegui.scene.label_places import place_box
 from pipegui.scene.projection import Projection
-from pipegui.texts import tr
-from pipegui.theme import SPACING
+from pipegui.states.descriptions import axis_names, coordinate_lines
+from pipegui.style.theme import SPACING
 
 CROSS = 10
 END = 5.0

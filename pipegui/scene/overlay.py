@@ -10,15 +10,15 @@ from PySide6.QtWidgets import QWidget
 
 from pipecore.geometry import Array
 from pipecore.types import Deformation, DeformationKind
-from pipegui import theme
-from pipegui.colours import VERDICT
+from pipegui.i18n.texts import first_capital, format_measure, tr
 from pipegui.scene.label_places import LEADER, place_box
 from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
 from pipegui.scene.projection import Projection
-from pipegui.texts import first_capital, format_measure, tr
-from pipegui.theme import SPACING
+from pipegui.style import theme
+from pipegui.style.colours import VERDICT
+from pipegui.style.theme import SPACING
 
 ICON = 16
 HANDLE = 5.0

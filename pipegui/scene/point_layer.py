@@ -15,9 +15,9 @@ from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkRenderer
 
 from pipecore.types import Floats, PointCloud
-from pipegui.colour_maps import Colours
-from pipegui.document import Box
+from pipegui.model.document import Box
 from pipegui.scene.spreading import Spread
+from pipegui.style.colour_maps import Colours
 
 SMALLEST_SLICE, LARGEST_SLICE = 25_000, 1_000_000
 MOVING_LEVEL = 400_000

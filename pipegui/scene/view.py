@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from pipecore.geometry import Array
 from pipecore.types import NO_ID, PointCloud, Profiles
-from pipegui import theme
-from pipegui.document import Background, Box, Measurement, Tool, ViewOptions
+from pipegui.i18n.texts import mark, tr
+from pipegui.model.document import Background, Box, Measurement, Tool, ViewOptions
 from pipegui.scene import clipping, shapes
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
@@ -26,8 +26,8 @@ from pipegui.scene.overlay import Overlay, label_of
 from pipegui.scene.picking import warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
-from pipegui.texts import mark, tr
-from pipegui.view_state import SceneState
+from pipegui.states.view_state import SceneState
+from pipegui.style import theme
 
 BACKGROUND = {
     Background.LIGHT: ("#eef1f4", "#fbfcfd"),

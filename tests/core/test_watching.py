@@ -8,7 +8,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tests.bench.watching import Footprint, run
+from tools.bench.watching import Footprint, run
 
 MIB = 2**20
 SIZE = 200 * MIB

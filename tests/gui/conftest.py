@@ -12,10 +12,11 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
-from pipegui import texts, theme
-from pipegui.document import Document, Scan
-from pipegui.jobs import Jobs
-from pipegui.main_window import MainWindow
+from pipegui.i18n import texts
+from pipegui.model.document import Document, Scan
+from pipegui.style import theme
+from pipegui.window.main_window import MainWindow
+from pipegui.work.job_queue import Jobs
 from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_parts
 from tests.gui.patience import PATIENCE, PatientBot

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
-from pipegui.parts import Parts
+from pipegui.window.views import Parts
 
 
 class FakeView(QWidget):

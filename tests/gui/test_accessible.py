@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import commands, view_commands
-from pipegui.document import Scan
+from pipegui.model import commands, view_commands
+from pipegui.model.document import Scan
 from pipegui.panels.deformation_columns import INDEX
 from tests.factories import make_scan
 
@@ -137,7 +137,7 @@ def test_that_f6_goes_from_panel_to_panel_and_back(whole, qtbot):
 def test_that_the_list_of_keys_names_all_of_them(whole, qtbot):
     from PySide6.QtWidgets import QDialog, QDialogButtonBox
 
-    from pipegui.menus import SPECS
+    from pipegui.window.action_table import SPECS
 
     qtbot.keyClick(whole, Qt.Key.Key_F1)
     dialog = whole.findChild(QDialog, "shortcuts")

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QImage
 
-from pipegui import app, jobs
+from pipegui import app
+from pipegui.work import job_queue as jobs
 from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_parts
 
@@ -15,7 +16,7 @@ from tests.gui.fakes import make_fake_parts
 @pytest.fixture
 def faked(qapp, monkeypatch):
     """The app over fakes, as `main` finds them."""
-    monkeypatch.setattr("pipegui.parts.make_parts", make_fake_parts)
+    monkeypatch.setattr("pipegui.window.views.make_parts", make_fake_parts)
     monkeypatch.setattr(jobs.Jobs.__init__, "__defaults__", (_read, _detect, _plan, None))
 
 

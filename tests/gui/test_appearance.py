@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QAbstractButton, QApplication
 
-from pipegui import theme
+from pipegui.style import theme
 
 pytestmark = pytest.mark.usefixtures("colours_of_the_system")
 

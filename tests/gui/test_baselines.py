@@ -13,8 +13,8 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
-from pipegui.parts import make_parts
 from pipegui.scene.canvas import SETTLED_SECONDS
+from pipegui.window.views import make_parts
 from tests.factories import make_cloud, make_result
 from tests.gui.patience import wait_until_still
 

@@ -5,9 +5,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
-from pipegui import commands
-from pipegui.command_search import CommandSearch, match
-from pipegui.main_window import MainWindow
+from pipegui.model import commands
+from pipegui.window.command_palette import CommandSearch, match
+from pipegui.window.main_window import MainWindow
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,10 @@ from pipecore.errors import SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, Review, ReviewState, Verdict
-from pipegui import commands, selecting
-from pipegui.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
-from pipegui.history import History
+from pipegui.model import commands
+from pipegui.model import selection as selecting
+from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
+from pipegui.model.history import History
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()

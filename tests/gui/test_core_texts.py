@@ -11,8 +11,8 @@ from pipecore.io import read, write_laz
 from pipecore.rules import load_rule
 from pipecore.settings import Settings
 from pipecore.types import ElementKind
-from pipegui import texts
-from pipegui.reasons import REASONS, _pattern, reason_text
+from pipegui.i18n import texts
+from pipegui.i18n.reason_texts import REASONS, _pattern, reason_text
 from tests import catalogue
 from tests.factories import make_scan
 

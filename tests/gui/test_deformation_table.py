@@ -10,7 +10,7 @@ from pipecore.types import Review, ReviewState
 from pipegui.panels.deformation_columns import COLUMNS, EXPENDABLE, INDEX, SHOWN_FIRST
 from pipegui.panels.deformation_model import DeformationFilter, DeformationModel
 from pipegui.panels.deformation_table import DeformationTable
-from pipegui.view_state import TableState
+from pipegui.states.view_state import TableState
 from tests.factories import make_result
 
 STRICT = QAbstractItemModelTester.FailureReportingMode.Fatal

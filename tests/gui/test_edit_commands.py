@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from pipecore.catalogues import sizes_of
 from pipecore.types import ReviewState
-from pipegui import commands, edit_commands
-from pipegui.document import Document, Scan, Selection
-from pipegui.history import History
-from pipegui.project_file import work_of
+from pipegui.model import commands, element_commands
+from pipegui.model.document import Document, Scan, Selection
+from pipegui.model.history import History
+from pipegui.project.project_file import work_of
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan(2000)
@@ -43,16 +43,16 @@ def edits(draw):
         elif not ids:
             return
         elif kind == "delete":
-            history.do(edit_commands.delete_elements, [one])
+            history.do(element_commands.delete_elements, [one])
         elif kind == "rename":
-            history.do(edit_commands.rename_element, one, text)
+            history.do(element_commands.rename_element, one, text)
         elif kind == "size":
-            history.do(edit_commands.set_nominal_size, one, SIZES[number % len(SIZES)])
+            history.do(element_commands.set_nominal_size, one, SIZES[number % len(SIZES)])
         elif kind == "hide":
             history.do(commands.set_hidden, [one], number % 2 == 0)
         elif kind == "select":
             history.do(commands.select_element, one)
-            history.do(edit_commands.mark_elements, ids[: number % 4])
+            history.do(element_commands.mark_elements, ids[: number % 4])
 
     return act
 
@@ -79,36 +79,36 @@ def test_that_any_edits_can_be_undone_to_the_start_and_done_again(sequence):
 
 def test_that_steps_are_named_after_what_they_are_about():
     history = History(START)
-    history.do(edit_commands.rename_element, 2, "Feed line")
-    history.do(edit_commands.delete_elements, [7, 2])
-    history.do(edit_commands.set_nominal_size, 9, None)
+    history.do(element_commands.rename_element, 2, "Feed line")
+    history.do(element_commands.delete_elements, [7, 2])
+    history.do(element_commands.set_nominal_size, 9, None)
     assert history.steps == ["Rename Pipe 2", "Delete Feed line, Pipe 7", "Change size of Pipe 9"]
 
 
 def test_that_what_changes_nothing_is_no_step():
     history = History(START)
-    history.do(edit_commands.delete_elements, [])
-    history.do(edit_commands.rename_element, 2, "Pipe 2")
-    history.do(edit_commands.rename_scan, 0, "  ")
-    history.do(edit_commands.rename_run, 1, " Run 1")
-    history.do(edit_commands.set_nominal_size, 2, RESULT.element(2).nominal)
+    history.do(element_commands.delete_elements, [])
+    history.do(element_commands.rename_element, 2, "Pipe 2")
+    history.do(element_commands.rename_scan, 0, "  ")
+    history.do(element_commands.rename_run, 1, " Run 1")
+    history.do(element_commands.set_nominal_size, 2, RESULT.element(2).nominal)
     assert history.steps == []
 
 
 def test_that_several_elements_are_a_selection_until_another_is_selected():
     document = commands.select_element(START, 7)
-    document = edit_commands.mark_elements(document, [7, 9, 0])
+    document = element_commands.mark_elements(document, [7, 9, 0])
     assert document.selection == Selection(2, 7, others=frozenset({9}))
     assert commands.select_parent(document).selection == Selection(2, 7)
     assert commands.select_element(document, 2).selection.others == frozenset()
-    assert edit_commands.mark_elements(START, [3]) is START
+    assert element_commands.mark_elements(START, [3]) is START
 
 
 def test_that_first_steps_are_forgotten_before_memory_runs_out():
     per_edit = RESULT.element_id.nbytes + RESULT.deviation.nbytes
     history = History(START, budget_bytes=3 * per_edit)
     for element_id in IDS[:6]:
-        history.do(edit_commands.delete_elements, [element_id])
+        history.do(element_commands.delete_elements, [element_id])
     assert len(history.steps) == 3
     assert history.steps[-1] == f"Delete {RESULT.element(IDS[5]).label}"
     history.go_to(0)
@@ -119,5 +119,5 @@ def test_that_first_steps_are_forgotten_before_memory_runs_out():
 def test_that_steps_that_share_their_arrays_are_kept(n):
     history = History(START, budget_bytes=1000)
     for i in range(n):
-        history.do(edit_commands.rename_element, 2, f"line {i}")
+        history.do(element_commands.rename_element, 2, f"line {i}")
     assert len(history.steps) == n

@@ -8,9 +8,9 @@ from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QInputDialog, QLineEdit, QMenu
 
 from pipecore.types import ReviewState
-from pipegui.document import Box, Scan, Selection
+from pipegui.model.document import Box, Scan, Selection
 from pipegui.panels.project_model import NAME, NodeKind, ProjectModel
-from pipegui.view_state import TreeState
+from pipegui.states.view_state import TreeState
 from tests.factories import make_scan
 
 LEFT = Qt.MouseButton.LeftButton
@@ -285,7 +285,7 @@ def test_that_hidden_and_reviewed_things_stay_so_when_another_pipe_goes(window, 
 
 def test_that_detecting_in_a_box_needs_a_box_and_keeps_the_rest(window, qtbot):
     assert not window.actions_["detect_in_box"].isEnabled()
-    from pipegui import commands
+    from pipegui.model import commands
 
     pipe = window.document.result.element(7)
     low, high = sorted([tuple(pipe.axis.start - 0.3), tuple(pipe.axis.end + 0.3)])

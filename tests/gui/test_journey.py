@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 
-from pipegui.document import ColourBy, Selection
-from pipegui.parts import make_parts
+from pipegui.model.document import ColourBy, Selection
 from pipegui.scene.canvas import SETTLED_SECONDS
 from pipegui.scene.colouring import PROFILE_COLOURS
+from pipegui.window.views import make_parts
 from tests.factories import make_cloud, make_result
 from tests.gui.patience import wait_until_still
 

@@ -6,14 +6,14 @@ import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QTabWidget
 
-from pipegui.kept_choices import keep, keep_tab
+from pipegui.controllers.remembered_choices import keep, keep_tab
 from pipegui.panels.deformation_table import DeformationTable
-from pipegui.parts import Parts
 from pipegui.plots.deviation_map import DeviationMap
 from pipegui.plots.preview_view import PreviewView
 from pipegui.plots.radius_plot import AT_FIRST, RadiusPlot
 from pipegui.plots.section_view import SectionView
-from pipegui.view_state import TableState
+from pipegui.states.view_state import TableState
+from pipegui.window.views import Parts
 from tests.factories import make_result
 from tests.gui.fakes import FakeScene
 

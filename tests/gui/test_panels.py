@@ -10,8 +10,8 @@ from PySide6.QtTest import QAbstractItemModelTester
 
 from pipecore.settings import DirectionPreset, Settings, iterate_fields
 from pipecore.types import DeformationKind, Verdict
-from pipegui import commands
-from pipegui.document import Document
+from pipegui.model import commands
+from pipegui.model.document import Document
 from pipegui.panels.deformation_columns import COLUMNS
 from pipegui.panels.deformation_model import DeformationFilter, DeformationModel
 from pipegui.panels.deformation_table import DeformationTable
@@ -20,7 +20,7 @@ from pipegui.panels.project_tree import ProjectTree
 from pipegui.panels.properties import PropertiesPanel
 from pipegui.panels.settings_form import ELSEWHERE, SettingsForm
 from pipegui.panels.stacks_panel import StacksPanel
-from pipegui.view_state import TableState, TreeState, resolve
+from pipegui.states.view_state import TableState, TreeState, resolve
 from tests.factories import make_result
 
 STRICT = QAbstractItemModelTester.FailureReportingMode.Fatal

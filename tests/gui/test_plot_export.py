@@ -9,7 +9,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication, QImage
 
-from pipegui.document import ProfileKey, Selection
+from pipegui.model.document import ProfileKey, Selection
 from pipegui.plots.chart import SAVED_AS
 from pipegui.plots.deviation_map import DeviationMap
 from pipegui.plots.export import to_csv, to_tsv

@@ -6,7 +6,7 @@ import pytest
 from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
 from pipegui.plots.pattern import index_at, pattern_of
 from pipegui.plots.unrolled import from_clock, unroll
-from pipegui.section_cut import Ellipse
+from pipegui.states.section import Ellipse
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()

@@ -5,12 +5,12 @@ import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtWidgets import QApplication
 
-from pipegui import commands, cuts
-from pipegui.document import Document, ProfileKey, Scan, Selection
+from pipegui.model import commands, result_queries
+from pipegui.model.document import Document, ProfileKey, Scan, Selection
 from pipegui.plots.deviation_map import DeviationMap
 from pipegui.plots.radius_plot import RadiusPlot
 from pipegui.plots.section_view import SectionView
-from pipegui.view_state import MapState, RadiusPlotState, SectionState, resolve
+from pipegui.states.view_state import MapState, RadiusPlotState, SectionState, resolve
 from tests.factories import make_scan
 from tests.gui.patience import hover
 
@@ -374,12 +374,12 @@ def test_that_the_map_shows_the_cursor_of_the_3d_view(qtbot):
 
 def test_that_a_spot_on_the_surface_and_its_point_are_one():
     index = int(np.flatnonzero(RESULT.element_id == 2)[17])
-    chainage, clock = cuts.spot_of_point(CLOUD, RESULT, 2, index)
-    spot = cuts.spot_on_surface(RESULT, 2, chainage, clock)
+    chainage, clock = result_queries.spot_of_point(CLOUD, RESULT, 2, index)
+    spot = result_queries.spot_on_surface(RESULT, 2, chainage, clock)
     off = np.linalg.norm(spot - CLOUD.xyz[index])
     assert off == pytest.approx(abs(RESULT.deviation[index]), abs=2e-3)
-    assert cuts.spot_of_point(CLOUD, RESULT, 9, index) is None
-    assert cuts.spot_of_point(CLOUD, RESULT, 2, -1) is None
+    assert result_queries.spot_of_point(CLOUD, RESULT, 9, index) is None
+    assert result_queries.spot_of_point(CLOUD, RESULT, 2, -1) is None
 
 
 def test_that_in_a_small_panel_the_radius_has_all_the_room(radius, qtbot):

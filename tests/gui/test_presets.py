@@ -5,10 +5,10 @@ from PySide6.QtCore import Qt
 
 from pipecore.errors import SettingsError
 from pipecore.settings import Settings
-from pipegui import commands
-from pipegui.document import Document
+from pipegui.model import commands
+from pipegui.model.document import Document
+from pipegui.model.presets import STANDARD, Presets, applied
 from pipegui.panels.settings_form import SettingsForm
-from pipegui.presets import STANDARD, Presets, applied
 
 LEFT = Qt.MouseButton.LeftButton
 OWN = Settings().replace(

@@ -9,14 +9,14 @@ from PySide6.QtTest import QSignalSpy
 
 from pipecore.preview import plan_stacks, preview_profile
 from pipecore.settings import ProfileMethod, Settings
-from pipegui import commands
-from pipegui.document import Document, Measurement, Scan, Tool
-from pipegui.jobs import Jobs
+from pipegui.model import commands
+from pipegui.model.document import Document, Measurement, Scan, Tool
 from pipegui.panels.stacks_panel import NAME, PROFILES, SHARE, StacksPanel
-from pipegui.plan_state import PlanState, PreviewState
 from pipegui.plots.preview_view import PreviewView, summary_of, upright
-from pipegui.previewing import Previews
-from pipegui.view_state import resolve
+from pipegui.states.preview_state import PlanState, PreviewState
+from pipegui.states.view_state import resolve
+from pipegui.work.job_queue import Jobs
+from pipegui.work.previews import Previews
 from tests.factories import make_cloud
 from tests.gui.patience import PATIENCE_S
 

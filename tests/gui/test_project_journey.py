@@ -14,9 +14,9 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog
 from pipecore.io import write_laz
 from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Dent, Run, Straight
-from pipegui.document import Selection
-from pipegui.jobs import detect_pipes, read_file
-from pipegui.parts import make_parts
+from pipegui.model.document import Selection
+from pipegui.window.views import make_parts
+from pipegui.work.job_queue import detect_pipes, read_file
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -129,10 +129,10 @@ KILLED = """
     from PySide6.QtCore import QSettings, QTimer
     from PySide6.QtWidgets import QApplication
     from pipecore.io import read
-    from pipegui import edit_commands
-    from pipegui.document import Scan
-    from pipegui.jobs import Jobs
-    from pipegui.main_window import MainWindow
+    from pipegui.model import element_commands
+    from pipegui.model.document import Scan
+    from pipegui.work.job_queue import Jobs
+    from pipegui.window.main_window import MainWindow
     from tests.factories import make_scan
     from tests.gui.fakes import make_fake_parts
 
@@ -144,7 +144,7 @@ KILLED = """
     result = replace(make_scan(len(cloud))[1], source=laz, origin=cloud.origin)
     window.take_scan(Scan(laz.name, cloud))
     window.take_result(cloud, result)
-    window.do(edit_commands.rename_element, 2, "Feed line")
+    window.do(element_commands.rename_element, 2, "Feed line")
     window.projects.rescue.keep(then=lambda: os.kill(os.getpid(), signal.SIGKILL))
     app.exec()
 """

@@ -13,11 +13,11 @@ from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox
 
 from pipecore.io import read, write_laz
 from pipecore.types import ReviewState
-from pipegui import edit_commands
-from pipegui.cloud_reference import CloudState
-from pipegui.crash_guard import CrashGuard
-from pipegui.document import Document
-from pipegui.project_file import read_project
+from pipegui.model import element_commands
+from pipegui.model.document import Document
+from pipegui.project.cloud_reference import CloudState
+from pipegui.project.project_file import read_project
+from pipegui.work.crash_guard import CrashGuard
 from tests.factories import make_scan
 
 N = 3000
@@ -103,8 +103,8 @@ def press(window, qtbot, text: str) -> None:
 
 def test_that_work_is_saved_reopened_and_the_same(worked, qtbot, tmp_path, monkeypatch, make):
     window, path = worked, tmp_path / "job 7.pipegui"
-    window.do(edit_commands.delete_elements, [9])
-    window.do(edit_commands.rename_element, 2, "Feed line")
+    window.do(element_commands.delete_elements, [9])
+    window.do(element_commands.rename_element, 2, "Feed line")
     window.panels.table.chosen.emit(1)
     window.actions_["reject"].trigger()
     assert window.isWindowModified()
@@ -131,7 +131,7 @@ def test_that_work_is_saved_reopened_and_the_same(worked, qtbot, tmp_path, monke
 
 def test_that_the_mark_of_unsaved_work_follows_undo_and_redo(worked, qtbot, tmp_path, monkeypatch):
     save_to(worked, qtbot, monkeypatch, tmp_path / "a.pipegui")
-    worked.do(edit_commands.delete_elements, [9])
+    worked.do(element_commands.delete_elements, [9])
     assert worked.isWindowModified()
     worked.history.undo()
     assert not worked.isWindowModified()
@@ -201,7 +201,7 @@ def test_that_opening_a_project_asks_for_unsaved_work_first(
     worked, qtbot, tmp_path, monkeypatch, make
 ):
     save_to(worked, qtbot, monkeypatch, tmp_path / "a.pipegui")
-    worked.do(edit_commands.delete_elements, [9])
+    worked.do(element_commands.delete_elements, [9])
     document = worked.document
     worked.open_files([tmp_path / "a.pipegui"])
     press(worked, qtbot, "Cancel")
@@ -294,7 +294,7 @@ def test_that_an_exception_in_a_slot_is_told_with_details_and_the_work_kept(
     window = make(rescue=tmp_path / "unsaved")
     work_on(window, qtbot, laz)
     qtbot.waitUntil(lambda: window.projects.rescue.path.is_file() and is_idle(window))
-    window.do(edit_commands.delete_elements, [9])
+    window.do(element_commands.delete_elements, [9])
     guard = CrashGuard(window)
     guard.happened.connect(window.tell_crash)
     guard._hooks = (lambda *_: None, lambda *_: None)
@@ -342,7 +342,7 @@ def test_that_a_proper_end_leaves_nothing_and_a_crash_leaves_what_can_be_restore
     window = make(rescue=folder)
     work_on(window, qtbot, laz)
     qtbot.waitUntil(lambda: window.projects.rescue.path.is_file() and is_idle(window))
-    window.do(edit_commands.rename_element, 2, "Feed line")
+    window.do(element_commands.rename_element, 2, "Feed line")
     window.projects.rescue.keep()
     qtbot.waitUntil(lambda: is_idle(window))
     # What a process leaves that was killed: the copy, and a lock whose process is gone.
@@ -417,7 +417,7 @@ def test_that_a_scan_that_changed_after_it_was_read_is_noticed_when_reopened(
     press(again, qtbot, "Use it all the same")
     qtbot.waitUntil(lambda: again.document.scan is not None and is_idle(again))
     # What is saved from here on knows the scan as it was read now.
-    again.do(edit_commands.rename_element, 2, "Feed line")
+    again.do(element_commands.rename_element, 2, "Feed line")
     again.projects.save()
     qtbot.waitUntil(lambda: is_idle(again) and not again.isWindowModified())
     assert [state for _, state in read_project(path).located()] == [CloudState.FOUND]

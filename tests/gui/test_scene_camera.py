@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QPointF, QRect, QRectF, QSize
 from vtkmodules.vtkRenderingCore import vtkCamera
 
-from pipegui.document import Document, ProfileKey, Scan, Selection
+from pipegui.model.document import Document, ProfileKey, Scan, Selection
 from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.aiming import aim
@@ -17,7 +17,7 @@ from pipegui.scene.picking import PICK_RADIUS_PX, _find_near, pick_point, points
 from pipegui.scene.point_layer import estimate_spacing
 from pipegui.scene.pose import VIEW_ANGLE, Pose
 from pipegui.scene.projection import Projection, as_array
-from pipegui.view_state import resolve
+from pipegui.states.view_state import resolve
 from tests.factories import make_scan
 
 SIZE = (800, 600)

@@ -4,19 +4,9 @@ import numpy as np
 import pytest
 
 from pipecore.report.format import MINUS
-from pipegui import commands, view_commands
-from pipegui.colour_limits import shown_limits
-from pipegui.colour_maps import (
-    DEVIATION,
-    HEIGHT,
-    INTENSITY,
-    KINDS,
-    QUALITATIVE,
-    deviation_colours,
-    rgb,
-)
-from pipegui.colours import VERDICT
-from pipegui.document import Box, ColourBy, Document, Scan, ViewOptions
+from pipegui.model import commands, view_commands
+from pipegui.model.colour_limits import shown_limits
+from pipegui.model.document import Box, ColourBy, Document, Scan, ViewOptions
 from pipegui.scene.colouring import (
     MUTED,
     SOUND,
@@ -29,6 +19,16 @@ from pipegui.scene.colouring import (
 from pipegui.scene.legend import make_legend
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
 from pipegui.scene.spreading import Spread
+from pipegui.style.colour_maps import (
+    DEVIATION,
+    HEIGHT,
+    INTENSITY,
+    KINDS,
+    QUALITATIVE,
+    deviation_colours,
+    rgb,
+)
+from pipegui.style.colours import VERDICT
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipegui.document import Box, ColourBy
+from pipegui.model.document import Box, ColourBy
 from pipegui.scene import layers
 from pipegui.scene.colouring import points_in
 from pipegui.scene.point_layer import PointLayer

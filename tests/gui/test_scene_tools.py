@@ -7,12 +7,12 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
-from pipegui import view_commands
-from pipegui.document import Box, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
+from pipegui.model import view_commands
+from pipegui.model.document import Box, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene.measure_marks import lines_of
 from pipegui.scene.view import SceneView
-from pipegui.view_state import resolve
+from pipegui.states.view_state import resolve
 from tests.factories import ORIGIN, make_scan
 from tests.gui.patience import hover
 from tests.gui.test_scene_view import drag, mouse_move, on_screen, picture, seen_points, settle

@@ -9,7 +9,7 @@ from PySide6.QtGui import QWheelEvent
 from PySide6.QtWidgets import QApplication
 
 from pipecore.types import PointCloud
-from pipegui.document import (
+from pipegui.model.document import (
     Background,
     Box,
     ColourBy,
@@ -22,7 +22,7 @@ from pipegui.scene import pose as poses
 from pipegui.scene.canvas import SETTLED_SECONDS
 from pipegui.scene.shapes import ellipses
 from pipegui.scene.view import SceneView
-from pipegui.view_state import resolve
+from pipegui.states.view_state import resolve
 from tests.factories import make_scan
 from tests.gui.patience import PATIENCE, hover
 

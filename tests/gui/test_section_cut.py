@@ -8,7 +8,7 @@ import pytest
 from pipecore.geometry import surface_points
 from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensions_text
 from pipegui.plots.exaggeration import deviations
-from pipegui.section_cut import SectionCut, cut_section
+from pipegui.states.section import SectionCut, cut_section
 from tests.factories import bump, make_result, oval
 
 RESULT = make_result()

@@ -18,8 +18,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipegui import commands, texts, view_commands
-from pipegui.document import Scan
+from pipegui.i18n import texts
+from pipegui.model import commands, view_commands
+from pipegui.model.document import Scan
 from tests import catalogue
 from tests.factories import make_scan
 

@@ -10,9 +10,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
 from pipecore.types import PointCloud
-from pipegui.document import Box
+from pipegui.model.document import Box
 from pipegui.panels.clip_bar import ClipBar
-from pipegui.view_state import ClipState
+from pipegui.states.view_state import ClipState
 from tests.factories import make_cloud
 from tests.gui.patience import PATIENCE_S
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipegui import commands
-from pipegui.document import Document, ProfileKey, Scan
-from pipegui.view_state import resolve
+from pipegui.model import commands
+from pipegui.model.document import Document, ProfileKey, Scan
+from pipegui.states.view_state import resolve
 from tests.factories import NOISE, make_scan
 
 CLOUD, RESULT = make_scan()

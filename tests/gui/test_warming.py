@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QSettings
 
-from pipegui.warming import Warming, detect_demo
+from pipegui.work.kernel_warmup import Warming, detect_demo
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_that_the_window_says_what_it_does_at_the_first_run(window):
 def test_that_the_window_is_there_before_what_only_a_detection_needs():
     heavy = ("matplotlib", "numba", "open3d", "scipy.spatial", "scipy.ndimage", "laspy")
     program = (
-        "import sys, pipegui.main_window, pipegui.scene.view, pipegui.plots.section_view\n"
+        "import sys, pipegui.window.main_window, pipegui.scene.view, pipegui.plots.section_view\n"
         "import pipegui.plots.radius_plot, pipegui.plots.deviation_map\n"
         "import pipegui.plots.preview_view\n"
         f"print([name for name in {heavy} if name in sys.modules])"

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
-from pipegui.document import Background, ColourBy, ProfileKey, Selection, Tool
-from pipegui.menus import SPECS
+from pipegui.model.document import Background, ColourBy, ProfileKey, Selection, Tool
 from pipegui.panels.deformation_columns import INDEX
-from pipegui.view_state import resolve
+from pipegui.states.view_state import resolve
+from pipegui.window.action_table import SPECS
 from tests.factories import make_cloud, make_result
 from tests.gui.patience import PATIENCE_S, seen_after
 
@@ -610,7 +610,7 @@ def test_that_the_plots_are_headed_by_what_they_show(detected):
 
 
 def test_that_the_profile_under_the_cursor_of_the_radius_plot_is_marked_in_3d(detected):
-    from pipegui import commands
+    from pipegui.model import commands
 
     detected.do(commands.select_element, 2)
     parts = detected.parts
@@ -623,7 +623,7 @@ def test_that_the_profile_under_the_cursor_of_the_radius_plot_is_marked_in_3d(de
 
 
 def test_that_the_cursor_on_the_map_is_marked_in_3d_and_the_other_way_round(detected):
-    from pipegui import commands
+    from pipegui.model import commands
 
     detected.do(commands.select_element, 2)
     scan, parts = detected.document.scan, detected.parts

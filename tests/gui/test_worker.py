@@ -6,7 +6,7 @@ import time
 import pytest
 
 from pipecore.errors import ReadError
-from pipegui.worker import Cancelled, Failed, Finished, Progressed, Started, Worker
+from pipegui.work.worker import Cancelled, Failed, Finished, Progressed, Started, Worker
 from tests.gui.patience import PATIENCE_S, seen_after
 
 ENDS = (Finished, Failed, Cancelled)
@@ -136,7 +136,7 @@ def test_that_thousands_of_reports_do_not_flood_the_window(worker, qtbot):
 
 def test_that_time_left_is_told_once_it_can_be_known(worker, qtbot, monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("pipegui.worker.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("pipegui.work.worker.time.monotonic", lambda: clock[0])
 
     def work(progress):
         progress.update("profiles", 0.0)
@@ -151,7 +151,7 @@ def test_that_time_left_is_told_once_it_can_be_known(worker, qtbot, monkeypatch)
 
 def test_that_the_stages_shares_make_one_progress_of_the_whole(worker, qtbot, monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("pipegui.worker.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("pipegui.work.worker.time.monotonic", lambda: clock[0])
 
     def work(progress):
         progress.expect({"thinning": 0.2, "profiles": 0.6, "elements": 0.2})

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from pipecore.editing.changes import with_settings, without
 from pipecore.elements import BuiltElements, NearbyPoints
-from pipecore.elements.extent import MAX_SECTORS, section_misfit
-from pipecore.elements.refine import axis_through, fit_measured
-from pipecore.elements.surfaces import ArcSurface, LineSurface
+from pipecore.elements.refinement.extent import MAX_SECTORS, section_misfit
+from pipecore.elements.refinement.refine import axis_through, fit_measured
+from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, Array
 from pipecore.measurement import measure_elements

@@ -9,7 +9,7 @@ import numpy as np
 from pipecore.catalogues import nominal_size
 from pipecore.editing.changes import Labels, find, kinds_of, noted, on_elements
 from pipecore.editing.measuring import Shape, fit_shape, measure_anew, part_of
-from pipecore.elements.extent import SHOWN_GAP
+from pipecore.elements.refinement.extent import SHOWN_GAP
 from pipecore.errors import EditError
 from pipecore.geometry import ArcAxis, Array, LineAxis
 from pipecore.progress import NoProgress, Progress

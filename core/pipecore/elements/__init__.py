@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.catalogues import nominal_size
-from pipecore.elements.flanges import flanges
+from pipecore.elements.fittings.flanges import flanges
+from pipecore.elements.fittings.tees import Junction, Part, cut_tees, find_junctions
 from pipecore.elements.joining import join_straights
-from pipecore.elements.keeping import refine_pieces
-from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.pieces import Piece, find_pieces
-from pipecore.elements.refine import Fitted
+from pipecore.elements.proposals import Piece, find_pieces
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.elements.runs import Span, meeting_ends, number_runs, trim_to_reducer, trim_to_tangent
-from pipecore.elements.surfaces import ArcSurface, LineSurface
-from pipecore.elements.tees import Junction, Part, cut_tees, find_junctions
+from pipecore.elements.selection import refine_pieces
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings

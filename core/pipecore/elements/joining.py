@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from pipecore.elements.extent import SHOWN_GAP, Extent
-from pipecore.elements.refine import Fitted
+from pipecore.elements.refinement.extent import SHOWN_GAP, Extent
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs import Span, meeting_ends
-from pipecore.elements.surfaces import LineSurface, SurfaceFit
 from pipecore.geometry import LineAxis
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.io import las
+from pipecore.io.formats import las
 from pipecore.io.mapped import MappedFile
 from pipecore.io.reading import FARTHEST, FLOAT32_REACH, first_origin
 from pipecore.io.registry import identify

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore import parallel
-from pipecore.elements.ahead import AHEAD, refine_in_turn
+from pipecore.elements.speculative_refinement import AHEAD, refine_in_turn
 from pipecore.errors import CancelledError
 from pipecore.progress import NoProgress
 

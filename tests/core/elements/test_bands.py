@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore import Settings, detect
-from pipecore.elements.bands import is_off_bands
+from pipecore.elements.refinement.raised_bands import is_off_bands
 from pipecore.geometry import LineAxis
 from pipecore.settings import DirectionPreset
 from tests.core.shapes import cloud_of, random_direction, tube

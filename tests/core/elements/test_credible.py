@@ -5,11 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipecore.elements.credible import MAX_WAVINESS, failed_gate, is_credible
-from pipecore.elements.extent import Extent
-from pipecore.elements.refine import Fitted
-from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface, SurfaceFit
-from pipecore.elements.waviness import waviness
+from pipecore.elements.gates.acceptance import MAX_WAVINESS, failed_gate, is_credible
+from pipecore.elements.gates.waviness import waviness
+from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import (
+    ArcSurface,
+    LineSurface,
+    SphereSurface,
+    SurfaceFit,
+)
 from pipecore.geometry import LineAxis
 from pipecore.settings import ElementSettings
 from tests.core.shapes import FULL, ball, known, random_direction, tube

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore.elements.extent import find_extent, section_misfit, turning_by_row
+from pipecore.elements.refinement.extent import find_extent, section_misfit, turning_by_row
 from pipecore.elements.runs import (
     Lines,
     Span,

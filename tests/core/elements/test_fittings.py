@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore.elements.bends import Corner, fit_bend, pipe_residuals
-from pipecore.elements.extent import Extent
-from pipecore.elements.fittings import StraightEnd
-from pipecore.elements.flanges import find_flanges, flanges, longest_run
-from pipecore.elements.following import follow_end
-from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.refine import Fitted
+from pipecore.elements.fittings.bends import Corner, fit_bend, pipe_residuals
+from pipecore.elements.fittings.flanges import find_flanges, flanges, longest_run
+from pipecore.elements.fittings.open_ends import follow_end
+from pipecore.elements.fittings.straight_ends import StraightEnd
+from pipecore.elements.fittings.tees import cut_tees, find_junctions, tee_ends
+from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs import Span
-from pipecore.elements.surfaces import LineSurface, SurfaceFit
-from pipecore.elements.tees import cut_tees, find_junctions, tee_ends
 from pipecore.geometry import ArcAxis, LineAxis, unit
 from tests.core.shapes import cloud_of, jittered, plane, random_rotation, sampled, tube
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore.elements.extent import Extent
-from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.reducers import Step, find_steps, fit_reducer
-from pipecore.elements.refine import Fitted
-from pipecore.elements.surfaces import LineSurface, SurfaceFit
+from pipecore.elements.fittings.reducers import Step, find_steps, fit_reducer
+from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.geometry import LineAxis, surface_points, unit
 from pipecore.pipeline import detect
 from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Reducer, Run, Straight
+from pipecore.simulate.scoring import score
 from pipecore.types import ElementKind
 from tests.core.shapes import cloud_of, jittered, random_rotation, sampled, tube
-from tests.scoring import score
 
 NOISE, SPACING = 0.0015, 0.008
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore.elements.surfaces import (
+from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,
     SphereSurface,

@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore import io
-from pipecore.io import las, parts
+from pipecore.io import parts
+from pipecore.io.formats import las
 from pipecore.io.registry import identify
 from pipecore.pipeline import detect
 from pipecore.settings import Settings

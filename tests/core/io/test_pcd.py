@@ -6,7 +6,7 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import ReadError
-from pipecore.io import lzf
+from pipecore.io.formats import lzf
 from tests.core.io.writers import write_pcd
 
 

@@ -9,7 +9,8 @@ import pytest
 
 from pipecore import io
 from pipecore.errors import CancelledError, ReadError
-from pipecore.io import las, reading
+from pipecore.io import reading
+from pipecore.io.formats import las
 from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
 

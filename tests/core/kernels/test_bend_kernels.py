@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from pipecore._kernels import bends
-from pipecore.elements.bends import Corner, pipe_residuals
-from pipecore.elements.following import _View
-from pipecore.elements.surfaces import LineSurface
+from pipecore.elements.fittings.bends import Corner, pipe_residuals
+from pipecore.elements.fittings.open_ends import _View
+from pipecore.elements.refinement.surface_fits import LineSurface
 from pipecore.geometry import unit
 
 pytestmark = pytest.mark.kernels

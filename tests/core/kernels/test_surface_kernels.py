@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore._kernels import axes, fitting, nearby, surfaces
 from pipecore._kernels.grouping import group_by_label
-from pipecore.elements.nearby import NearbyPoints
-from pipecore.elements.surfaces import ArcSurface, LineSurface, SphereSurface
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
 from pipecore.geometry import ArcAxis, LineAxis, unit
 from pipecore.surface import Surface
 from pipecore.types import PointCloud
@@ -232,7 +232,7 @@ def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch,
 
     every, spacing = found(is_rough=False)
     assert_array_equal(found(is_rough=True)[0], every)
-    monkeypatch.setattr("pipecore.elements.nearby.FEW", 200)
+    monkeypatch.setattr("pipecore.elements.refinement.nearby_points.FEW", 200)
     some, wider = found(is_rough=True)
     assert np.isin(some, every).all()
     assert 10 < len(some) < 220 < len(every)

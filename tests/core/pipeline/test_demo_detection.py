@@ -5,7 +5,7 @@ import pytest
 from pipecore import detect, io
 from pipecore.resources import resource
 from pipecore.simulate import load_truth
-from tests.scoring import score
+from pipecore.simulate.scoring import score
 
 
 def test_that_all_deformations_of_the_demo_are_found_and_no_other():

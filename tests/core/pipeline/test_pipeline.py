@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore import parallel
-from pipecore.elements.refine import MAX_FIT_POINTS
+from pipecore.elements.refinement.refine import MAX_FIT_POINTS
 from pipecore.errors import CancelledError, SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.io import read
@@ -13,10 +13,10 @@ from pipecore.pipeline import STAGES, detect
 from pipecore.settings import Settings
 from pipecore.simulate import Scan, Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Elbow, Reducer, Run, Straight
+from pipecore.simulate.scoring import score
 from pipecore.types import NO_ID, ElementKind, PointCloud, Result
 from tests.conftest import SESSION_SEED
 from tests.core.shapes import cloud_of, plane, random_rotation, tube
-from tests.scoring import score
 
 ORIGIN = (432_100.0, 6_201_870.0, 110.0)
 RADIUS, RADIUS_END = 0.084, 0.057

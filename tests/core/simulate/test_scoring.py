@@ -21,8 +21,8 @@ from pipecore.simulate.scene import (
     Straight,
     Tee,
 )
+from pipecore.simulate.scoring import score
 from pipecore.types import Deformation, DeformationKind, Element, ElementKind, Profiles, Result
-from tests.scoring import score
 
 RUN = Run(
     (0.0, 0.0, 1.0),

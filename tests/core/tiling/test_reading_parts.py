@@ -13,7 +13,8 @@ from numpy.testing import assert_array_equal
 
 from pipecore import io
 from pipecore.errors import ReadError
-from pipecore.io import las, parts
+from pipecore.io import parts
+from pipecore.io.formats import las
 from pipecore.progress import NoProgress
 from pipecore.settings import LengthUnit
 from pipecore.tiling.engine import start_engine

@@ -1,0 +1,1 @@
+"""Fittings between straights: bends, reducers, flanges, tees, what follows open ends."""

@@ -1,0 +1,285 @@
+"""Reducers between two straights on one line: only where they begin and end is unknown.
+
+A free cone on a reducer of which little is seen has a slope that is hardly known, and where
+the straights beside it end is known to a few centimetres only. Straights of different radii
+on one line leave two unknowns: where the one ends and where the other begins. Points before,
+between and after must agree with the straights and with the cone from the one to the other.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.elements.fittings.straight_ends import StraightEnd, lean_of, straight_ends
+from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.refine import RADIAL_COS, Fitted, axis_through
+from pipecore.elements.refinement.surface_fits import (
+    LineSurface,
+    SurfaceFit,
+    fit_surface,
+    robust_sigma,
+)
+from pipecore.geometry import LineAxis, unit
+
+Array = NDArray[np.float64]
+
+ON_AXIS, MAX_LEAN = 0.12, np.deg2rad(6.0)
+"""Axes of straights joined by a reducer pass each other within this share of the radius, and
+lean to each other by no more than this angle."""
+NARROWEST, WIDEST = 0.4, 0.96
+"""Radii of the narrow end, in those of the wide one."""
+MIN_PIPE = 1.5
+"""Straights that a reducer joins are longer than this many radii."""
+SHORTEST, LONGEST, WIDEST_GAP = 0.1, 5.0, 12.0
+"""Lengths of a reducer, and the widest gap between straights that it may join, with what is
+hidden of them, in radii of its wider end."""
+OVERSHOOT = 1.0
+"""Straights may have been followed so many radii too far, or have ended as much too early."""
+N_TRIED = 28
+"""Places tried for either end; then again between those beside the best."""
+BETWEEN = 0.35
+"""Ends of a straight that is part of a reducer are no further off its axis, in radii of its
+wider end."""
+FACING = np.cos(np.deg2rad(50.0))
+"""Points whose normals are further from a radius of the pipe are of something else."""
+MIN_POINTS, MOST_POINTS = 12, 1500
+"""Points on a reducer at least, and how many tell at most where it begins and ends."""
+LEAST_SIGMA = 0.0005
+"""Points are not believed to scatter less than this about a cone, metres."""
+MIN_SHARE = 0.6
+"""Of the points between the radii of both straights so many lie on a reducer."""
+FREE_SD = 0.006
+"""A reducer whose own points carry its radius to this share needs no straights for it."""
+
+
+def find_steps(fitted: list[Fitted]) -> list["Step"]:
+    """Straights on one line but of different radii, near each other; the furthest first.
+
+    What lies between two is then known before it may be taken for a straight itself.
+    """
+    ends = [e for e in straight_ends(fitted) if _is_pipe(fitted[e.which[0]])]
+    return sorted(_steps(ends), key=lambda step: -step.gap)
+
+
+def _is_pipe(straight: Fitted) -> bool:
+    """Whether a straight is longer than a flange or the end of something else."""
+    return straight.axis.length > MIN_PIPE * straight.fit.model.radius
+
+
+def _steps(ends: list[StraightEnd]) -> Iterator["Step"]:
+    if not ends:
+        return
+    points, radii = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
+    for a, one in enumerate(ends):
+        furthest = 1.1 * WIDEST_GAP * np.maximum(one.radius, radii[a + 1 :])
+        is_near = np.square(points[a + 1 :] - one.point).sum(axis=1) < furthest**2
+        for b in (np.flatnonzero(is_near) + a + 1).tolist():
+            if _may_be_joined(one, ends[b]):
+                yield Step(one, ends[b])
+
+
+def _may_be_joined(one: StraightEnd, other: StraightEnd) -> bool:
+    wide, narrow = max(one.radius, other.radius), min(one.radius, other.radius)
+    if one.which[0] == other.which[0] or not NARROWEST < narrow / wide < WIDEST:
+        return False
+    if -(one.outward @ other.outward) < np.cos(MAX_LEAN):
+        return False
+    gap = other.point - one.point
+    along = float(gap @ one.outward)
+    across = float(np.linalg.norm(gap - along * one.outward))
+    return -OVERSHOOT * wide < along < WIDEST_GAP * wide and across <= ON_AXIS * wide
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Two straights on one line, and what lies between them.
+
+    Chainage is counted along their common direction from the end of the first.
+    """
+
+    one: StraightEnd
+    other: StraightEnd
+
+    @cached_property
+    def direction(self) -> Array:
+        """From the first straight to the second."""
+        return unit(self.one.outward - self.other.outward)
+
+    @cached_property
+    def gap(self) -> float:
+        """From the end of the first straight to that of the second, along the direction."""
+        return float((self.other.point - self.one.point) @ self.direction)
+
+    @property
+    def wide(self) -> float:
+        """Radius of the wider straight."""
+        return max(self.one.radius, self.other.radius)
+
+    @property
+    def narrow(self) -> float:
+        """Radius of the narrower straight."""
+        return min(self.one.radius, self.other.radius)
+
+    def has_between(self, straight: Fitted) -> bool:
+        """Whether a straight lies where the reducer would, and may be part of it.
+
+        A cylinder fits one side of a reducer of low slope, leaning to its axis.
+        """
+        model = straight.fit.model
+        if not isinstance(model, LineSurface) or not self.narrow < model.radius < self.wide:
+            return False
+        ends = np.stack([straight.axis.start, straight.axis.end])
+        chainage = self.chainage(ends)
+        off = np.linalg.norm(ends - self.centre(self.one, chainage), axis=1)
+        reach = OVERSHOOT * self.wide
+        return bool(
+            chainage.min() > -reach
+            and chainage.max() < self.gap + reach
+            and np.ptp(chainage) < LONGEST * self.wide
+            and off.max() < BETWEEN * self.wide
+        )
+
+    def chainage(self, xyz: Array) -> Array:
+        """Chainage of points (n, 3)."""
+        return np.asarray((xyz - self.one.point) @ self.direction)
+
+    def centre(self, end: StraightEnd, chainage: Array | float) -> Array:
+        """Where the axis of one of the straights is at a chainage."""
+        begin = (end.point - self.one.point) @ self.direction
+        per_chainage = end.outward / (end.outward @ self.direction)
+        return np.asarray(end.point + np.multiply.outer(chainage - begin, per_chainage))
+
+    def axis(self, begin: float, end: float) -> LineAxis:
+        """Axis of the cone that begins and ends at two chainages."""
+        start, stop = self.centre(self.one, begin), self.centre(self.other, end)
+        return LineAxis(start, unit(stop - start), float(np.linalg.norm(stop - start)))
+
+    def cone(self, begin: float, end: float) -> LineSurface:
+        """The cone that begins and ends at two chainages."""
+        axis = self.axis(begin, end)
+        return LineSurface(
+            axis.at(axis.length / 2),
+            axis.direction,
+            0.5 * (self.one.radius + self.other.radius),
+            (self.other.radius - self.one.radius) / axis.length,
+            is_tapered=True,
+        )
+
+    def off(self, xyz: Array, begin: float, ends: Array) -> Array:
+        """Distances of points (n, 3) from straight, cone and straight as one pipe.
+
+        For one begin and several ends of the cone, shape (k, n). Between, a point is as far
+        off as it is from both straights drawn on, each counted by how near its end is.
+        """
+        chainage = self.chainage(xyz)
+        t = np.clip((chainage - begin) / (ends[:, None] - begin), 0.0, 1.0)
+        one, other = (
+            np.linalg.norm(xyz - self.centre(end, chainage), axis=1) - end.radius
+            for end in (self.one, self.other)
+        )
+        return np.asarray(np.abs(one + t * (other - one)))
+
+
+def fit_reducer(
+    step: Step, straights: tuple[Fitted, Fitted], nearby: NearbyPoints, usable: NDArray[np.bool_]
+) -> Fitted | None:
+    """Find where a reducer between two straights begins and ends.
+
+    Parameters
+    ----------
+    step : Step
+    straights : tuple of Fitted
+        Those of its ends.
+    nearby : NearbyPoints
+    usable : ndarray of bool
+        Thinned points that are free or on the straights.
+
+    Returns
+    -------
+    Fitted or None
+        None where no cone joins the straights. Unless its own points carry it, its radius
+        is as sure as those of the straights.
+    """
+    before, after = (min(OVERSHOOT * step.wide, 0.5 * s.axis.length) for s in straights)
+    low, high = -before, step.gap + after
+    if high - low < SHORTEST * step.wide:
+        return None
+    around = LineAxis(step.one.point + low * step.direction, step.direction, high - low)
+    points = nearby.thinned(around, step.wide, 0.0)
+    xyz = nearby.surface.xyz[points]
+    chainage, rho, _ = around.pipe_coordinates(xyz)
+    outward = (xyz - around.at(chainage)) / rho[:, None]
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[points], outward))
+    chosen = usable[points] & (cosine > FACING)
+    points, xyz = points[chosen], xyz[chosen]
+    if len(points) < MIN_POINTS:
+        return None
+    band = max(5.0 * nearby.surface.noise, 0.005)
+    sample = xyz[np.linspace(0, len(xyz) - 1, min(len(xyz), MOST_POINTS)).astype(np.intp)]
+    begin, end = _best_ends(step, sample, low, high, band)
+    return _fitted(step, begin, end, straights, nearby, points, band)
+
+
+def _best_ends(step: Step, xyz: Array, low: float, high: float, band: float) -> tuple[float, float]:
+    """Chainages between which the cone leaves least of the points' distances."""
+    best = (np.inf, low, high)
+    begins = ends = np.linspace(low, high, N_TRIED)
+    for _ in range(2):
+        for begin in begins:
+            lengths = (ends - begin) / step.wide
+            possible = ends[(lengths > SHORTEST) & (lengths < LONGEST)]
+            if len(possible) == 0:
+                continue
+            left = np.square(np.minimum(step.off(xyz, begin, possible), band)).sum(axis=1)
+            least = int(np.argmin(left))
+            best = min(best, (float(left[least]), float(begin), float(possible[least])))
+        beside = (high - low) / (N_TRIED - 1) * np.linspace(-1.0, 1.0, 9)
+        begins, ends = best[1] + beside, best[2] + beside
+    return best[1], best[2]
+
+
+def _fitted(
+    step: Step,
+    begin: float,
+    end: float,
+    straights: tuple[Fitted, Fitted],
+    nearby: NearbyPoints,
+    points: NDArray[np.intp],
+    band: float,
+) -> Fitted | None:
+    xyz, normals = nearby.surface.xyz[points], nearby.surface.normals[points]
+    axis, model = step.axis(begin, end), step.cone(begin, end)
+    chainage, rho, clock = axis.pipe_coordinates(xyz)
+    residual, _, outward = model.residuals(xyz)
+    between = (chainage > 0) & (chainage < axis.length)
+    cosine = np.abs(np.einsum("ij,ij->i", normals, outward))
+    on = between & (np.abs(residual) < band) & (cosine > RADIAL_COS)
+    beside = between & (rho > step.narrow - band) & (rho < step.wide + band)
+    if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
+        return None
+    own, sigma = points[on], max(robust_sigma(residual[on]), LEAST_SIGMA)
+    lean = lean_of(normals[on], outward[on], axis.tangent(chainage[on]))
+    extent = find_extent(
+        chainage[on], clock[on], residual[on], lean, lambda *_: np.empty((2, 0)),
+        axis.length, model.radius, nearby.usual_spacing(own), sigma,
+    )  # fmt: skip
+    if extent is None:
+        return None
+    covered = min(extent.coverage * (extent.high - extent.low) / axis.length, 1.0)
+    extent = Extent(0.0, axis.length, extent.arc, covered, extent.gaps)
+    misfit = section_misfit(clock[on], residual[on], extent.arc)
+    free = fit_surface(model, nearby.behind(own)[1], 3.0 * sigma)
+    if free is not None and free.radius_sd < FREE_SD * free.model.radius:
+        ends = np.stack([axis.start, axis.end])
+        return Fitted(free, axis_through(free.model, ends), own, extent, misfit)
+    sds = np.array([s.radius_sd for s in straights])
+    across = sigma**2 / on.sum()
+    tilt = 12.0 * across / axis.length**2
+    covariance = np.diag(
+        [across, across, tilt, tilt, (sds @ sds) / 4, (sds @ sds) / axis.length**2]
+    )
+    return Fitted(SurfaceFit(model, covariance, sigma, int(on.sum())), axis, own, extent, misfit)

@@ -1,0 +1,42 @@
+"""Ends of straights, which tell of the fittings between them."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.surface_fits import LineSurface
+
+Array = NDArray[np.float64]
+End = tuple[int, int]
+"""An end of a fitted straight: its number, and 0 for its start or 1 for its end."""
+NO_ELLIPSES: NDArray[np.intp] = np.empty(0, np.intp)
+
+
+class StraightEnd(NamedTuple):
+    """An end of a straight: which, where, the direction out of it, and its radius."""
+
+    which: End
+    point: Array
+    outward: Array
+    radius: float
+
+
+def straight_ends(fitted: list[Fitted], first: int = 0) -> list[StraightEnd]:
+    """Ends of the cylinders, from the piece with the number `first` on."""
+    ends = []
+    for i, f in enumerate(fitted[first:], start=first):
+        if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered:
+            direction, radius = f.fit.model.direction, f.fit.model.radius
+            ends.append(StraightEnd((i, 0), f.axis.start, -direction, radius))
+            ends.append(StraightEnd((i, 1), f.axis.end, direction, radius))
+    return ends
+
+
+def lean_of(normals: Array, outward: Array, tangent: Array) -> Array:
+    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
+    clockwise = np.cross(tangent, outward)
+    ahead = np.einsum("ij,ij->i", normals, clockwise)
+    out = np.einsum("ij,ij->i", normals, outward)
+    return np.asarray(np.arctan(ahead / np.where(out == 0.0, np.inf, out)))

@@ -1,0 +1,188 @@
+"""Tees: where a branch meets the side of a run, with the piece of run around it.
+
+A scan does not show the welds of a tee, so its length is that of a standard one of the
+run's size, ASME B16.9: from the branch's axis to either end 25 mm and 0.7 of the run's
+outside diameter, which is within 4 mm of the table from DN 40 to DN 500.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.runs import Lines, Span
+from pipecore.geometry import ArcAxis, LineAxis
+
+BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
+"""A branch leaves its run at this angle or more."""
+MAX_SKEW = 0.25
+"""The axes pass each other within this share of the run's radius."""
+ENDS_WITHIN = (0.5, 1.6)
+"""A branch ends where the run's surface is: so many of the run's radii from its axis."""
+MAX_GAP, MAX_FAR_SKEW = 4.0, 0.1
+"""A branch whose foot is hidden may end so many of its radii off, if it aims this well."""
+MIN_BRANCH = 0.38
+"""A branch that is narrower, in radii of the run, is a nozzle set on it: no tee is made so."""
+CENTRE_TO_END = (0.025, 0.7)
+"""Metres, and outside diameters more."""
+MIN_REST = 0.7
+"""What is left of the run beside a tee is a pipe of its own from so many radii on."""
+
+
+@dataclass(frozen=True)
+class Junction:
+    """An end of `branch` in the side of `run`."""
+
+    branch: int
+    run: int
+    chainage: float
+    """Where the axes meet."""
+    is_wide: bool
+    """Whether the branch is wide enough for a tee."""
+
+
+def find_junctions(spans: list[Span], met: set[tuple[int, int]]) -> list[Junction]:
+    """Ends that run into the side of a straight of no smaller radius.
+
+    Parameters
+    ----------
+    spans : list of Span
+        Of all elements.
+    met : set of (int, int)
+        Ends (element, 0 for its start or 1 for its end) that another element follows.
+    """
+    found = []
+    lines = Lines([span.axis for span in spans])
+    radii = np.array([max(span.radii) for span in spans])
+    for i, branch in enumerate(spans):
+        for end in (0, 1):
+            point = branch.axis.end if end else branch.axis.start
+            tangent = branch.axis.tangent(branch.axis.length if end else 0.0)
+            outward = tangent if end else -tangent
+            for j in lines.near(point, ENDS_WITHIN[1] * radii + MAX_GAP * branch.radii[end]):
+                run = spans[j]
+                if i == j or not isinstance(run.axis, LineAxis):
+                    continue
+                radius = max(run.radii)
+                if branch.radii[end] > 1.05 * radius:
+                    continue
+                chainage, rho, _ = run.axis.pipe_coordinates(point[None])
+                beside = -0.5 * radius < chainage[0] < run.axis.length + 0.5 * radius
+                least, most = (r * radius for r in ENDS_WITHIN)
+                is_far = rho[0] > most
+                if is_far:
+                    most = radius + (0.0 if (i, end) in met else MAX_GAP) * branch.radii[end]
+                if not beside or not least < rho[0] < most:
+                    continue
+                across = np.cross(outward, run.axis.direction)
+                sine = float(np.linalg.norm(across))
+                towards = run.axis.at(chainage[0]) - point
+                skew = abs(float(towards @ across)) / max(sine, 1e-9)
+                max_skew = MAX_FAR_SKEW if is_far else MAX_SKEW
+                if sine > BRANCH_SIN and skew < max_skew * radius and towards @ outward > 0:
+                    # Where the axes meet, not where the branch ends, is a lateral's middle.
+                    lean = float(outward @ run.axis.direction) / sine
+                    middle = float(chainage[0]) + lean * float(rho[0])
+                    is_wide = branch.radii[end] > MIN_BRANCH * radius
+                    found.append(Junction(i, j, middle, is_wide))
+    return found
+
+
+def tee_ends(chainages: list[float], length: float, radius: float) -> list[tuple[float, float]]:
+    """Where the tees of one run start and end.
+
+    Tees that would overlap end half-way between their branches; a remainder of run that is
+    too short for a pipe is part of the tee beside it.
+
+    Parameters
+    ----------
+    chainages : list of float
+        Of the branches' axes; those at one place make one tee (a cross).
+    length, radius : float
+        Of the run, metres.
+    """
+    least, diameters = CENTRE_TO_END
+    reach, rest = least + diameters * 2 * radius, MIN_REST * radius
+    middles: list[float] = []
+    for chainage in sorted(chainages):
+        if not middles or chainage - middles[-1] > radius:
+            middles.append(chainage)
+    ends = [(max(m - reach, 0.0), min(m + reach, length)) for m in middles]
+    for k in range(len(ends) - 1):
+        if ends[k + 1][0] - ends[k][1] < rest:
+            border = 0.5 * (middles[k] + middles[k + 1])
+            ends[k], ends[k + 1] = (ends[k][0], border), (border, ends[k + 1][1])
+    if ends and ends[0][0] < rest:
+        ends[0] = (0.0, ends[0][1])
+    if ends and length - ends[-1][1] < rest:
+        ends[-1] = (ends[-1][0], length)
+    return [(low, high) for low, high in ends if high - low > rest]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """An element, or a stretch of one that tees have cut: `whole` is the element's number."""
+
+    found: Fitted
+    axis: LineAxis | ArcAxis
+    whole: int
+    is_tee: bool = False
+
+
+def cut_tees(
+    fitted: list[Fitted],
+    axes: list[LineAxis | ArcAxis],
+    tees: list[Junction],
+    xyz: NDArray[np.float64],
+) -> list[Part]:
+    """Cut runs into their tees and what is left between them.
+
+    Parameters
+    ----------
+    fitted : list of Fitted
+    axes : list of LineAxis or ArcAxis
+        Theirs, trimmed to what they meet.
+    tees : list of Junction
+    xyz : ndarray, shape (n, 3)
+        The thinned points.
+
+    Returns
+    -------
+    list of Part
+        In the order of the elements; the parts of one follow each other along its axis.
+    """
+    parts = []
+    for i, (found, axis) in enumerate(zip(fitted, axes, strict=True)):
+        middles = [t.chainage for t in tees if t.run == i]
+        if not middles or not isinstance(axis, LineAxis):
+            parts.append(Part(found, axis, i))
+            continue
+        chainage = (xyz[found.own] - axis.start) @ axis.direction
+        at = -np.inf
+        ends = tee_ends(middles, axis.length, found.fit.model.radius)
+        borders = [0.0, *(b for pair in ends for b in pair), axis.length]
+        for k, (low, high) in enumerate(pairwise(borders)):
+            if high - low < 1e-9:
+                continue
+            upto = high if high < axis.length else np.inf
+            own = found.own[(chainage >= at) & (chainage < upto)]
+            at = upto
+            piece = _cut(found, axis, low, high, own)
+            parts.append(Part(piece, piece.axis, i, is_tee=k % 2 == 1))
+    return parts
+
+
+def _cut(run: Fitted, axis: LineAxis, low: float, high: float, own: NDArray[np.intp]) -> Fitted:
+    """The stretch of a run between two chainages of its trimmed axis."""
+    piece = LineAxis(axis.at(low), axis.direction, high - low)
+    shift = float(run.axis.pipe_coordinates(piece.start[None])[0][0])
+    gaps = tuple(
+        (max(a - shift, 0.0), min(b - shift, piece.length))
+        for a, b in run.extent.gaps
+        if b > shift and a < shift + piece.length
+    )
+    extent = Extent(0.0, piece.length, run.extent.arc, run.extent.coverage, gaps)
+    return replace(run, axis=piece, own=own, extent=extent)

@@ -1,0 +1,254 @@
+"""Pieces of axes: which ellipses make a cylinder, a bend, a reducer or a sphere.
+
+The paper classifies by the shape of the axis (line or arc) and by the pattern of the
+radius along it (constant, linear, semicircle; figure 7). Here each pattern is a model,
+and in every chain of centres the models that explain most ellipses are taken off one
+after the other.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from pipecore._kernels.arcs import best_arc
+from pipecore._kernels.lines import best_line, take_lines
+from pipecore.axes import join_centres
+from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
+from pipecore.ellipses import Ellipses
+from pipecore.geometry import cross, unit
+from pipecore.parallel import for_chunks
+from pipecore.progress import NoProgress, Progress
+
+Array = NDArray[np.float64]
+
+N_TRIALS = 400
+MIN_COS = float(np.cos(np.deg2rad(12.0)))
+MAX_OFFSET = 0.06
+"""A centre is off the axis by less than this share of the radius."""
+MAX_CHANGE = 0.06
+"""A radius is off the pattern by less than this share."""
+SAME_RADIUS = 0.025
+"""Radii of one piece differ from its pattern by less than this share (and twice their sd)."""
+MIN_ELLIPSES = 5
+MOSTLY_STRAIGHT = 0.7
+"""What is a bend only at its ends is a straight, such as a vessel between its heads."""
+MIN_SPHERE = 8
+"""Ellipses cut off its centre that make a sphere."""
+SAME_CENTRE = 0.06
+"""Normals of a sphere's sections meet within this share of its radius."""
+MIN_TAPER = 0.04
+LONG_PIECE = 2.5
+"""Straight pieces of this many radii come first: shorter ones may be part of a bend."""
+SHORT_PIECE = 0.5
+CHAINS_AT_ONCE = 64
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A surface proposed for some ellipses.
+
+    Parameters
+    ----------
+    model : LineSurface, ArcSurface or SphereSurface
+    ellipses : ndarray of int
+        The ellipses that it explains.
+    low, high : float
+        Extent along the axis: metres from the middle of a line, radians from the first
+        axis of an arc's plane (see `ArcSurface`); 0 and 0 for a sphere.
+    """
+
+    model: LineSurface | ArcSurface | SphereSurface
+    ellipses: NDArray[np.intp]
+    low: float = 0.0
+    high: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """What of the ellipses makes pieces, one array per column."""
+
+    centre: Array
+    axis: Array
+    radius: Array
+    radius_sd: Array
+    width: Array
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> "_Rows":
+        return _Rows(
+            self.centre[rows],
+            self.axis[rows],
+            self.radius[rows],
+            self.radius_sd[rows],
+            self.width[rows],
+        )
+
+
+def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress) -> list[Piece]:
+    """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
+
+    Parameters
+    ----------
+    ellipses : Ellipses
+    chain : ndarray of int32
+        Chain of each ellipse.
+    progress : Progress
+    """
+    order = np.argsort(chain, kind="stable")
+    rows = _Rows(
+        ellipses.centre, ellipses.axis, ellipses.radius, ellipses.radius_sd, ellipses.width
+    )
+    chains = np.split(order, np.flatnonzero(np.diff(chain[order])) + 1)
+    chains = [members for members in chains if len(members) >= MIN_ELLIPSES]
+    found: list[list[Piece]] = [[] for _ in chains]
+
+    def explain(first: int, last: int) -> None:
+        for i in range(first, last):
+            found[i] = _explain_chain(ellipses, rows, chains[i])
+
+    for_chunks(explain, len(chains), CHAINS_AT_ONCE, "elements", progress, (0.0, 0.3))
+    return [*find_spheres(ellipses), *(piece for pieces in found for piece in pieces)]
+
+
+def _explain_chain(ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
+    pieces, members = _take_lines(rows, members, LONG_PIECE)
+    tapered, members = _take_lines(rows, members, SHORT_PIECE, is_tapered=True)
+    pieces += tapered
+    for group in _reconnected(ellipses, members):
+        arcs = _take_arcs(rows, group)
+        pieces += arcs
+        for piece in arcs:
+            members = np.setdiff1d(members, piece.ellipses)
+    return pieces + _take_lines(rows, members, SHORT_PIECE)[0]
+
+
+def _reconnected(ellipses: Ellipses, members: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Groups of the members that still hang together."""
+    if len(members) < MIN_ELLIPSES:
+        return []
+    label = join_centres(ellipses[members], NoProgress())
+    return [members[label == k] for k in range(label.max() + 1)]
+
+
+def _take_lines(
+    rows: _Rows,
+    members: NDArray[np.intp],
+    min_length: float,
+    is_tapered: bool = False,
+) -> tuple[list[Piece], NDArray[np.intp]]:
+    """Take straight pieces of at least `min_length` radii off the members, best first.
+
+    Returns them and the members that are left.
+    """
+    if len(members) < MIN_ELLIPSES:
+        return [], members
+    e = rows[members]
+    number = np.empty(len(members), np.int32)
+    lines = take_lines(
+        e.centre, e.axis, e.radius, e.radius_sd, N_TRIALS, is_tapered,
+        (MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER), float(np.median(e.width)),
+        min_length, MIN_ELLIPSES, number,
+    )  # fmt: skip
+    pieces = [
+        Piece(
+            LineSurface(line[:3].copy(), line[3:6].copy(), line[6], line[7], is_tapered),
+            members[number == k],
+            line[8],
+            line[9],
+        )
+        for k, line in enumerate(lines)
+    ]
+    return pieces, members[number < 0]
+
+
+def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
+    """Take bends off the members, best first."""
+    e = rows[members]
+    free = np.ones(len(members), np.bool_)
+    inliers = np.empty(len(members), np.bool_)
+    arc = np.empty(8)
+    pieces: list[Piece] = []
+    while free.sum() >= MIN_ELLIPSES:
+        count = best_arc(
+            e.centre, e.axis, e.radius, e.radius_sd, free, N_TRIALS,
+            MIN_COS, 1.5 * MAX_OFFSET, 1.5 * MAX_CHANGE, inliers, arc,
+        )  # fmt: skip
+        if count < MIN_ELLIPSES:
+            break
+        chosen = np.flatnonzero(inliers)
+        free[chosen] = False
+        straight = np.empty(len(members), np.bool_)
+        n_straight = best_line(
+            e.centre, e.axis, e.radius, e.radius_sd, inliers, N_TRIALS, False,
+            MIN_COS, MAX_OFFSET, MAX_CHANGE, straight,
+        )  # fmt: skip
+        if n_straight > MOSTLY_STRAIGHT * count:
+            continue
+        model = ArcSurface(
+            arc[:3].copy(), arc[3:6].copy(), arc[6], float(np.median(e.radius[chosen]))
+        )
+        low, high, part = arc_extent(model, e.centre[chosen])
+        if len(part) < MIN_ELLIPSES or high - low < np.deg2rad(12.0):
+            continue
+        pieces.append(Piece(model, members[chosen[part]], low, high))
+    return pieces
+
+
+def arc_angles(model: ArcSurface, points: Array) -> Array:
+    """Angle of points about the arc's normal, from a fixed direction in its plane, in 0 … 2π."""
+    e1 = unit(cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
+    e2 = cross(model.normal, e1)
+    q = points - model.centre
+    return np.mod(np.arctan2(q @ e2, q @ e1), 2 * np.pi)
+
+
+def arc_direction(model: ArcSurface, angle: float) -> Array:
+    """Unit vector from the centre at an angle of `arc_angles`."""
+    e1 = unit(cross(np.eye(3)[np.argmin(np.abs(model.normal))], model.normal))
+    return np.asarray(np.cos(angle) * e1 + np.sin(angle) * cross(model.normal, e1))
+
+
+def arc_extent(model: ArcSurface, points: Array) -> tuple[float, float, NDArray[np.intp]]:
+    """Angles between which points lie without a gap of over two radii, and which do."""
+    angles = arc_angles(model, points)
+    order = np.argsort(angles)
+    gaps = np.diff(angles[order], append=angles[order[0]] + 2 * np.pi)
+    first = (np.argmax(gaps) + 1) % len(order)
+    order = np.roll(order, -first)
+    unrolled = np.mod(angles[order] - angles[order[0]], 2 * np.pi)
+    parts = np.split(
+        np.arange(len(order)),
+        np.flatnonzero(np.diff(unrolled) > 2.0 * model.radius / model.bend_radius) + 1,
+    )
+    part = max(parts, key=len)
+    base = angles[order[0]]
+    return base + unrolled[part[0]], base + unrolled[part[-1]], order[part]
+
+
+def find_spheres(ellipses: Ellipses) -> list[Piece]:
+    """Find spheres: ellipses whose normals meet in one point far from their planes.
+
+    On a cylinder the normals of a section meet in its own plane; on a sphere those of
+    all sections meet in the centre, however far from it they were cut.
+    """
+    centres, radii = ellipses.meeting_point, ellipses.meeting_distance
+    offset = np.einsum("ij,ij->i", ellipses.centre - centres, ellipses.normal) / radii
+    free = np.isfinite(radii)
+    tree = cKDTree(np.where(free[:, None], centres, 1e9))
+    pieces: list[Piece] = []
+    may_be = np.flatnonzero(free & (np.abs(offset) > 0.15))
+    # Most have hardly a neighbour: counting them all at once is quick.
+    n_near = tree.query_ball_point(centres[may_be], SAME_CENTRE * radii[may_be], return_length=True)
+    for i in may_be[n_near >= MIN_SPHERE]:
+        if not free[i]:
+            continue
+        near = np.sort(np.array(tree.query_ball_point(centres[i], SAME_CENTRE * radii[i]), np.intp))
+        near = near[free[near] & (np.abs(radii[near] - radii[i]) < 0.05 * radii[i])]
+        is_far = np.abs(offset[near]) > 0.1
+        if is_far.sum() < MIN_SPHERE or np.ptp(offset[near]) < 0.4:
+            continue
+        model = SphereSurface(np.median(centres[near], axis=0), float(np.median(radii[near])))
+        free[near] = False
+        pieces.append(Piece(model, near))
+    return pieces

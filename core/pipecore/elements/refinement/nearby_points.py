@@ -1,0 +1,243 @@
+"""All points of the full cloud around an axis."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels import nearby as kernels
+from pipecore._kernels.grouping import group_by_label, group_into
+from pipecore._kernels.voxels import rename_voxels
+from pipecore.allocation import Allocate, in_memory
+from pipecore.elements.refinement.surface_fits import SphereSurface, SurfaceModel
+from pipecore.geometry import Axis
+from pipecore.progress import NoProgress, Progress
+from pipecore.surface import Surface
+from pipecore.surface.grid import GridFrame, VoxelCounter, table_of
+from pipecore.types import PointCloud
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+INNER, OUTER = 0.4, 1.3
+"""The neighbourhood of an axis, in radii: deep dents inside, what touches outside."""
+REACH_OF_SPHERE = 1.2
+"""The same of a sphere."""
+CELL_VOXELS, COARSE = 6.0, 4
+"""Edge of the cells in which thinned points are looked up, in voxels; coarse ones in fine ones."""
+
+FEW = 20_000
+"""A rough look takes a sample where more points than this are in the cells about a surface."""
+
+AT_ONCE, BEGUN = 2_000_000, 0.3
+"""Points put into cells between two words to the progress, and what it is told."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointsOn:
+    """Thinned points on a surface, in the order of their indices, and what lies inside it.
+
+    Parameters
+    ----------
+    own : ndarray of int, shape (n,)
+    residual, chainage, clock, lean : ndarray, shape (n,)
+        Distance from the surface, pipe coordinates, and the angle from the surface's normal
+        to the point's own, towards increasing clock.
+    inside : callable
+        Takes the chainages between which it is asked for, and returns chainage and clock of
+        the points well inside the surface that face as it does, shape (2, m).
+    spacing : float
+        Distance between neighbours among the points looked at, metres.
+    """
+
+    own: Indices
+    residual: Array
+    chainage: Array
+    clock: Array
+    lean: Array
+    inside: Callable[[float, float], Array]
+    spacing: float
+
+
+def _in_order_met(
+    keys: NDArray[np.int64],
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Ids of keys in the order in which they are met, and the key of each id."""
+    known, at, place = np.unique(keys, return_index=True, return_inverse=True)
+    order = np.argsort(at)
+    ids = np.empty(len(known), np.int32)
+    ids[order] = np.arange(len(known), dtype=np.int32)
+    return ids[place], known[order]
+
+
+class NearbyPoints:
+    """Looks up thinned points around an axis, and the cloud's points behind them.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    surface : Surface
+    progress : Progress
+        Told now and then while the points are put into cells.
+    allocate : callable
+        Makes the arrays with a value for each thinned point.
+    """
+
+    def __init__(
+        self,
+        cloud: PointCloud,
+        surface: Surface,
+        progress: Progress = NoProgress(),
+        allocate: Allocate = in_memory,
+    ) -> None:
+        self._cloud = cloud
+        self.surface = surface
+        self._members, self._starts = surface.behind
+        edge = CELL_VOXELS * surface.voxel
+        frame = GridFrame.of(surface.xyz, edge)
+        first, _, n_y, n_z = frame.numbers
+        counter = VoxelCounter(frame)
+        cell = allocate("cell_of_point", (len(surface.xyz),), np.int32)
+        for start in range(0, len(cell), AT_ONCE):
+            progress.update("elements", BEGUN)
+            counter.add(surface.xyz, start, min(start + AT_ONCE, len(cell)), cell)
+        progress.update("elements", BEGUN)
+        numbers = counter.keys
+        place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
+        coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
+        x, y, z = (place // COARSE).T
+        coarse, coarse_numbers = _in_order_met((x * coarse_y + y) * coarse_z + z)
+        table = table_of(coarse_numbers)
+        order, cell_starts = group_by_label(coarse, len(coarse_numbers))
+        middles = (first + place[order] + 0.5) * edge
+        self._grid = (
+            first * edge, COARSE * edge, coarse_y, coarse_z, *table, cell_starts, middles,
+            0.5 * np.sqrt(3.0) * edge + 1e-6,
+        )  # fmt: skip
+        rank = np.empty(len(order), np.int32)
+        rank[order] = np.arange(len(order), dtype=np.int32)
+        progress.update("elements", BEGUN)
+        rename_voxels(cell, 0, len(cell), rank)
+        points = allocate("points_of_cells", (len(cell),), np.int32)
+        self._cells = points, group_into(cell, len(order), points)
+
+    def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
+        """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
+        inner, outer = INNER * radius, OUTER * radius
+        cells = kernels.cells_around(
+            *self._grid, axis.numbers, inner, outer, -margin, axis.length + margin
+        )
+        return np.asarray(
+            kernels.points_around(
+                self.surface.xyz, *self._cells, cells, axis.numbers, inner, outer, margin
+            )
+        )
+
+    def on_surface(
+        self,
+        model: SurfaceModel,
+        axis: Axis,
+        margin: float,
+        is_free: NDArray[np.bool_],
+        *,
+        band: float,
+        depth: float,
+        min_cos: float,
+        is_rough: bool = False,
+    ) -> PointsOn:
+        """Free thinned points on a surface about an axis, and what lies inside it.
+
+        Parameters
+        ----------
+        model : SurfaceModel
+        axis : Axis
+            Its own.
+        margin : float
+            How far beyond the axis's ends points are looked for, metres.
+        is_free : ndarray of bool
+            Thinned points that may be on the surface.
+        band, depth : float
+            Points are on it up to the former distance, and inside from the latter on.
+        min_cos : float
+            Least cosine between a point's normal and the surface's.
+        is_rough : bool
+            Whether a sample of the points will do where there are many.
+        """
+        inner, outer = INNER * model.radius, OUTER * model.radius
+        numbers, shape = axis.numbers, (model.kind, model.numbers())
+        points = self.surface.xyz, self.surface.normals
+        # Only in a shell about the surface, which for a cone is not about one distance.
+        shell = inner, outer
+        if not model.is_conical:
+            shell = max(inner, model.radius - band), min(outer, model.radius + band)
+        own, columns, spacing = kernels.look_on(
+            self._grid, *points, self.surface.spacing, self.surface.voxel, is_free, *self._cells,
+            numbers, shell, inner, outer, margin, *shape, band, min_cos, FEW if is_rough else 0,
+        )  # fmt: skip
+
+        def look_inside(begin: float, end: float) -> Array:
+            cells = kernels.cells_around(*self._grid, numbers, inner, outer, begin, end)
+            found: Array = kernels.points_inside(
+                *points, *self._cells, cells, numbers, inner, outer, begin, end,
+                *shape, depth, min_cos,
+            )  # fmt: skip
+            return found
+
+        residual, chainage, clock, lean = columns
+        return PointsOn(own, residual, chainage, clock, lean, look_inside, spacing)
+
+    def on_sphere(
+        self,
+        model: SphereSurface,
+        is_free: NDArray[np.bool_],
+        *,
+        band: float,
+        min_cos: float,
+        is_rough: bool = False,
+    ) -> Indices:
+        """Free thinned points within `band` of a sphere whose normals are like its own.
+
+        A rough look takes a sample of them where there are many.
+        """
+        outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
+        inner = model.radius - band
+        cells = kernels.cells_in_shell(*self._grid, model.centre, inner, outer)
+        stride = kernels.stride_of(self._cells[1], cells, FEW if is_rough else 0)
+        return np.asarray(
+            kernels.points_on_sphere(
+                self.surface.xyz, self.surface.normals, is_free, *self._cells, cells,
+                model.centre, inner, outer, min_cos, stride,
+            )
+        )  # fmt: skip
+
+    def usual_spacing(self, thinned: Indices) -> float:
+        """Distance between neighbours among some thinned points, not below the thinning's."""
+        return float(kernels.usual_spacing(self.surface.spacing, thinned, self.surface.voxel))
+
+    def within_ball(self, centre: Array, radius: float) -> Indices:
+        """Thinned points within `radius` of a place, in order."""
+        cells = kernels.cells_in_shell(*self._grid, centre, 0.0, radius)
+        return np.asarray(
+            kernels.points_in_ball(self.surface.xyz, *self._cells, cells, centre, radius)
+        )
+
+    def behind(self, thinned: Indices) -> tuple[Indices, Array]:
+        """Indices and coordinates of the cloud's points behind thinned points.
+
+        Those behind one thinned point are in the order of their coordinates, so that the
+        cloud's own order does not matter.
+        """
+        n = int(self._n_behind(thinned).sum())
+        index, xyz = np.empty(n, np.intp), np.empty((n, 3))
+        kernels.behind(self._members, self._starts, thinned, self._cloud.xyz, index, xyz)
+        return index, xyz
+
+    def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:
+        """What `behind` tells, and the normals of the thinned points, one for each point."""
+        index, xyz = self.behind(thinned)
+        normals = np.repeat(self.surface.normals[thinned], self._n_behind(thinned), axis=0)
+        return index, xyz, normals
+
+    def _n_behind(self, thinned: Indices) -> Indices:
+        return np.asarray(self._starts[thinned + 1] - self._starts[thinned], np.intp)

@@ -1,0 +1,383 @@
+"""Refinement: a robust geometric fit of each piece to all points around it, and its extent."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore._kernels.extent import points_between
+from pipecore._kernels.misfit import look_at_sphere
+from pipecore.elements.proposals import Piece, arc_direction
+from pipecore.elements.refinement.extent import (
+    MAX_SECTORS,
+    Extent,
+    find_extent,
+    section_misfit,
+)
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.raised_bands import is_off_bands
+from pipecore.elements.refinement.surface_fits import (
+    ArcSurface,
+    LineSurface,
+    SphereSurface,
+    SurfaceFit,
+    fit_surface,
+)
+from pipecore.ellipses import radius_sd_factor
+from pipecore.geometry import ArcAxis, LineAxis, cross
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+AnySurface = LineSurface | ArcSurface | SphereSurface
+
+RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
+"""A point belongs to a surface only if its normal is this close to the surface's."""
+CLEAR_COS = float(np.cos(np.deg2rad(15.0)))
+"""Beside bands the normals of the pipe's own points are this close to the surface's."""
+MAX_FIT_POINTS, MAX_ROUGH_POINTS = 60_000, 1_500
+"""Larger elements are fitted to an even sample of this many points; fewer in early rounds."""
+LEAST_POINTS, SURE_POINTS, MANY_POINTS = 15, 4_000, 6_000
+"""No fit takes fewer points. What early rounds are unsure of is judged as if they had used up
+to so many points. More than many are fitted to at last if so many of them hold."""
+LEAST_CLEAR = 30
+"""Points from which on a fit stays clear of the ends."""
+AGAIN = 1.5
+"""A fit that starts from that of a sample takes so many times its standard deviation."""
+INSIDE = 0.1
+"""Points are well inside a surface from this share of its radius on."""
+MAX_RADIUS_CHANGE = 0.25
+"""A fit that leaves the proposed radius by more has found something else."""
+PATCHES = 12, 8, 5
+"""Patches of a sphere around and up, and the points from which on one counts."""
+N_ROUNDS = 3
+HARDLY_ROUGH, ROUGH, VERY_ROUGH = 1.15, 1.5, 3.0
+"""Slack for pieces fitted to a sample at last, and for those whose last round of fitting is
+still to come, or whose last two are."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A piece fitted to the cloud.
+
+    Parameters
+    ----------
+    fit : SurfaceFit
+    axis : LineAxis or ArcAxis
+        As scanned, from where the points start to where they end.
+    own : ndarray of int
+        Thinned points on the surface.
+    extent : Extent
+        Along `axis`.
+    misfit : float
+        See `section_misfit`; metres.
+    """
+
+    fit: SurfaceFit[LineSurface] | SurfaceFit[ArcSurface] | SurfaceFit[SphereSurface]
+    axis: LineAxis | ArcAxis
+    own: Indices
+    extent: Extent
+    misfit: float
+
+    @property
+    def radius_sd(self) -> float:
+        """Standard deviation of the radius: the fit's, and what is off the round section.
+
+        Sectors that leave circle and oval by more than noise does are as many wrong
+        measurements of the radius as there are sectors; metres.
+        """
+        n_sectors = max(self.extent.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
+        by_noise = 0.5 * np.pi * self.fit.sigma**2 * n_sectors / max(len(self.own), 1)
+        excess = max(self.misfit**2 - by_noise, 0.0)
+        factor = float(radius_sd_factor(self.extent.arc))
+        return float(np.hypot(self.fit.radius_sd, factor * np.sqrt(excess / n_sectors)))
+
+    @property
+    def radii(self) -> tuple[float, float]:
+        """Radius at the start and at the end of the axis, metres."""
+        model = self.fit.model
+        if not isinstance(model, LineSurface):
+            return model.radius, model.radius
+        return model.radius_at(self.axis.start), model.radius_at(self.axis.end)
+
+
+def refine_piece(
+    piece: Piece,
+    nearby: NearbyPoints,
+    is_free: Flags,
+    is_promising: Callable[[Fitted, float], bool] = lambda fitted, slack: True,
+    used: list[Indices] | None = None,
+) -> Fitted | None:
+    """Fit a piece's surface to the cloud's points and find how far it reaches.
+
+    Fit and extent improve each other in a few rounds.
+
+    Parameters
+    ----------
+    piece : Piece
+    nearby : NearbyPoints
+    is_free : ndarray of bool
+        Thinned points that no other element has taken.
+    is_promising : callable
+        Asked, with a slack for the limits of what later rounds can mend, before the last
+        round, which alone uses all points: most pieces end there. Of spheres already after
+        the first round.
+    used : list, optional
+        The free points that had a say are added to it.
+
+    Returns
+    -------
+    Fitted or None
+        None where the points do not carry the surface.
+    """
+    used = [] if used is None else used
+    if isinstance(piece.model, SphereSurface):
+        return _refine_sphere(piece.model, nearby, is_free, is_promising, used)
+    model = piece.model
+    sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
+    axis = axis_between(model, piece.low, piece.high)
+    fitted: Fitted | None = None
+    fit: SurfaceFit[Any] | None
+    for round_ in range(N_ROUNDS):
+        is_final = round_ == N_ROUNDS - 1
+        if is_final and not (fitted and is_promising(fitted, ROUGH)):
+            return None
+        margin = _margin(axis, model.radius, round_)
+        near = nearby.on_surface(
+            model, axis, margin, is_free,
+            band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
+            is_rough=not is_final,
+        )  # fmt: skip
+        used.append(near.own)
+        extent = find_extent(
+            near.chainage, near.clock, near.residual, near.lean, near.inside,
+            axis.length, model.radius, near.spacing, sigma,
+        )  # fmt: skip
+        if extent is None:
+            return None
+        # Near the ends other surfaces begin, so the fit stays clear of them.
+        clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
+        own, own_clock, own_residual, chosen = points_between(
+            near.own, near.chainage, near.clock, near.residual,
+            extent.low, extent.high, clear, LEAST_CLEAR,
+        )  # fmt: skip
+        misfit = section_misfit(own_clock, own_residual, extent.arc)
+        if is_final:
+            told = partial(Fitted, axis=axis, own=own, extent=extent, misfit=misfit)
+            assert fitted is not None
+            # All but the fit itself is as it will be at last.
+            if (
+                not is_promising(told(fitted.fit), HARDLY_ROUGH)
+                and _off_bands(fitted.fit, chosen, nearby, near.spacing) is None
+            ):
+                return None
+            fit = fit_measured(
+                model, chosen, nearby, 3.0 * sigma, near.spacing,
+                partial(_holds, is_promising, told),
+            )  # fmt: skip
+        else:
+            fit = _fit_roughly(model, chosen, nearby, 3.0 * sigma)
+        if fit is None:
+            return None
+        fitted = Fitted(fit, axis, own, extent, misfit)
+        model = fit.model
+        axis = axis_through(model, axis.at(np.array([extent.low, extent.high])))
+        sigma = max(fit.sigma, 0.0005)
+    return fitted and _placed(fitted, axis)
+
+
+def _placed(fitted: Fitted, axis: LineAxis | ArcAxis) -> Fitted:
+    """The fitted piece with the axis of its last fit, its extent counted from the axis's start."""
+    old = fitted.extent
+    gaps = tuple((a - old.low, b - old.low) for a, b in old.gaps)
+    extent = Extent(0.0, axis.length, old.arc, old.coverage, gaps)
+    return Fitted(fitted.fit, axis, fitted.own, extent, fitted.misfit)
+
+
+def axis_between(model: LineSurface | ArcSurface, low: float, high: float) -> LineAxis | ArcAxis:
+    """The axis of a model between two of its chainages (lines) or angles (arcs)."""
+    if isinstance(model, ArcSurface):
+        return model.axis_from(arc_direction(model, low), high - low)
+    return model.axis_between(low, high)
+
+
+def axis_through(model: LineSurface | ArcSurface, ends: Array) -> LineAxis | ArcAxis:
+    """The model's axis between the places nearest to two points."""
+    if isinstance(model, LineSurface):
+        low, high = (ends - model.middle) @ model.direction
+        return model.axis_between(float(low), float(high))
+    start, end = (e - model.centre for e in ends)
+    axis = model.axis_from(start, 0.0)
+    ahead = cross(axis.normal, axis.towards_start)
+    angle = float(np.mod(np.arctan2(end @ ahead, end @ axis.towards_start), 2 * np.pi))
+    return model.axis_from(start, angle)
+
+
+def _margin(axis: LineAxis | ArcAxis, radius: float, round_: int) -> float:
+    """How far beyond its ends an axis may grow in this round."""
+    if isinstance(axis, ArcAxis):
+        opening = (2 * np.pi - axis.bend_angle) * axis.bend_radius
+        return min(0.8 * radius, 0.5 * opening)
+    return radius if round_ == 0 else 0.5 * axis.length + 4.0 * radius
+
+
+def _band(sigma: float) -> float:
+    """Distance up to which points are on a surface."""
+    return max(5.0 * sigma, 0.0025)
+
+
+def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
+    """At most `limit` of the rows, evenly spread over them."""
+    if len(rows) <= limit:
+        return rows
+    return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
+
+
+def _fit_roughly(
+    model: AnySurface, thinned: Indices, nearby: NearbyPoints, scale: float
+) -> SurfaceFit[Any] | None:
+    """Fit the model to thinned points."""
+    if len(thinned) < LEAST_POINTS:
+        return None
+    points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
+    return _fit_sample(model, points, scale, min(len(thinned), SURE_POINTS))
+
+
+def _holds(
+    is_promising: Callable[[Fitted, float], bool],
+    told: Callable[[SurfaceFit[Any]], Fitted],
+    fit: SurfaceFit[Any],
+) -> bool:
+    """Whether a piece is promising with the fit of a sample."""
+    return is_promising(told(fit), HARDLY_ROUGH)
+
+
+def _fit_sample(
+    model: AnySurface, points: Array, scale: float, n_all: int
+) -> SurfaceFit[Any] | None:
+    """Fit the model to a sample; it is as sure of it as `n_all` points would be."""
+    fit = fit_surface(model, points, scale, is_rough=True)
+    if fit is None or not _is_still(fit, model):
+        return None
+    return replace(fit, covariance=fit.covariance * min(len(points) / n_all, 1.0))
+
+
+def _is_still(fit: SurfaceFit[Any], model: AnySurface) -> bool:
+    """Whether a fit found what was proposed."""
+    return bool(abs(fit.model.radius - model.radius) <= MAX_RADIUS_CHANGE * model.radius)
+
+
+def fit_measured(
+    model: AnySurface,
+    thinned: Indices,
+    nearby: NearbyPoints,
+    scale: float,
+    spacing: float,
+    holds: Callable[[SurfaceFit[Any]], bool] = lambda fit: True,
+) -> SurfaceFit[Any] | None:
+    """Fit a model as elements are measured: to all points, free of bands around the pipe.
+
+    Parameters
+    ----------
+    model : LineSurface, ArcSurface or SphereSurface
+        Where to start.
+    thinned : ndarray of int
+        Thinned points on the surface.
+    nearby : NearbyPoints
+    scale : float
+        Distance from the surface up to which points count in full, metres.
+    spacing : float
+        Distance between neighbouring thinned points, metres.
+    holds : callable
+        Asked of the fit to a sample of many points, from which that to all begins.
+
+    Returns
+    -------
+    SurfaceFit or None
+        None where the points do not carry the surface, or carry quite another one.
+    """
+    if len(thinned) < LEAST_POINTS:
+        return None
+    _, points = nearby.behind(thinned)
+    points = _evenly(points, MAX_FIT_POINTS)
+    start = model
+    if len(points) > MANY_POINTS:
+        sampled = _fit_sample(model, _evenly(points, SURE_POINTS), scale, len(points))
+        if sampled is None or not (
+            holds(sampled) or _off_bands(sampled, thinned, nearby, spacing) is not None
+        ):
+            return None
+        start, scale = sampled.model, AGAIN * sampled.sigma
+    fit = fit_surface(start, points, scale)
+    if fit is None or not _is_still(fit, model):
+        return None
+    own = _off_bands(fit, thinned, nearby, spacing)
+    if own is None:
+        return fit
+    if len(own) >= LEAST_POINTS:
+        _, points = nearby.behind(own)
+        fit = fit_surface(fit.model, _evenly(points, MAX_FIT_POINTS), 3.0 * fit.sigma)
+        if fit is not None and _is_still(fit, model):
+            return fit
+    return None
+
+
+def _off_bands(
+    fit: SurfaceFit[Any], thinned: Indices, nearby: NearbyPoints, spacing: float
+) -> Indices | None:
+    """The points that are not of bands around a pipe; None where there are none of those."""
+    model = fit.model
+    if not isinstance(model, LineSurface):
+        return None
+    xyz = nearby.surface.xyz[thinned]
+    chainage = (xyz - model.middle) @ model.direction
+    residual, _, outward = model.residuals(xyz)
+    is_own = is_off_bands(chainage, residual, spacing, model.radius)
+    if is_own is None:
+        return None
+    # Where a band or a rib meets the pipe, the normals turn away before the points do.
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
+    return np.asarray(thinned[is_own & (cosine > CLEAR_COS)], np.intp)
+
+
+def _refine_sphere(
+    model: SphereSurface,
+    nearby: NearbyPoints,
+    is_free: Flags,
+    is_promising: Callable[[Fitted, float], bool],
+    used: list[Indices],
+) -> Fitted | None:
+    sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
+    fitted = None
+    for round_ in range(N_ROUNDS):
+        is_final = round_ == N_ROUNDS - 1
+        if is_final and not (fitted and is_promising(fitted, ROUGH)):
+            return None
+        own = nearby.on_sphere(
+            model, is_free, band=_band(sigma), min_cos=RADIAL_COS, is_rough=not is_final
+        )
+        used.append(own)
+        if is_final:
+            fit = fit_measured(model, own, nearby, 3.0 * sigma, nearby.surface.voxel)
+        else:
+            fit = _fit_roughly(model, own, nearby, 3.0 * sigma)
+        if fit is None:
+            return None
+        model = fit.model
+        sigma = max(fit.sigma, 0.0005)
+        fitted = _fitted_sphere(fit, own, nearby)
+        if round_ == 0 and not is_promising(fitted, VERY_ROUGH):
+            return None
+    return fitted
+
+
+def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:
+    model, upright = fit.model, np.array([0.0, 0.0, 1.0])
+    misfit, low, high, arc = look_at_sphere(
+        nearby.surface.xyz, own, model.centre, model.radius, MAX_SECTORS, *PATCHES
+    )
+    axis = LineAxis(model.centre + low * upright, upright, high - low)
+    return Fitted(fit, axis, own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)

@@ -1,0 +1,1 @@
+"""Formats that can be read: one module each, one contract for all (`pipecore.io.source`)."""

@@ -1,0 +1,333 @@
+"""Changing elements by hand: what the menus of the tree and of the window do.
+
+Targets are the selected elements. What needs the cloud's points runs in the background.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtWidgets import QInputDialog, QMenu
+
+from pipecore.catalogues import sizes_of
+from pipecore.types import ElementKind, PointCloud, Result, ReviewState
+from pipegui.i18n.texts import format_measure, label_of, mark, tr
+from pipegui.model import commands, element_commands
+from pipegui.model import selection as selecting
+from pipegui.model.document import Document, Scan
+from pipegui.panels.project_tree import NodeKind
+from pipegui.work.job_queue import Edited
+from pipegui.work.worker import JobProgress
+
+if TYPE_CHECKING:
+    from pipegui.window.main_window import MainWindow
+
+_OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "")
+CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
+    NodeKind.SCAN: ("fit", "show_all", "", "detect", "detect_in_box", "", "rename", "close_scan"),
+    NodeKind.RUN: (*_OF_ELEMENTS, "rename", "detect_around", "delete"),
+    NodeKind.ELEMENT: (
+        *_OF_ELEMENTS,
+        "rename",
+        "kind",
+        "size",
+        "split",
+        "merge",
+        "",
+        "detect_around",
+        "delete",
+    ),
+    NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
+    NodeKind.DEFORMATION: ("zoom", "isolate", "", "accept", "reject", "reopen"),
+}
+"""Actions by the kind of row; "" separates."""
+
+NO_SIZE = mark("No nominal size")
+Reshape = Callable[[PointCloud, Result, JobProgress], Result]
+
+
+def conditions(document: Document) -> dict[str, bool]:
+    """What the selection is, by the names of what actions need."""
+    result, selection = document.result, document.selection
+    elements = selecting.elements_of(result, selection) if result is not None else []
+    return {
+        "elements": bool(elements),
+        "one_element": bool(selection.element_id) and len(elements) == 1,
+        "several_elements": len(elements) > 1 and bool(selection.others),
+        "deformation": bool(selection.deformation_id),
+        "box": document.view.clip_box is not None,
+    }
+
+
+class Edits:
+    """The part of the window's actions that changes elements and reviews."""
+
+    def __init__(self, window: "MainWindow") -> None:
+        self._window = window
+
+    def _targets(self) -> tuple[Scan, Result, list[int]]:
+        scan = self._window.document.scan
+        assert scan is not None
+        assert scan.result is not None
+        return (
+            scan,
+            scan.result,
+            selecting.elements_of(scan.result, self._window.document.selection),
+        )
+
+    # At once
+
+    def delete(self) -> None:
+        """Delete the selected elements."""
+        _, _, ids = self._targets()
+        self._window.do(element_commands.delete_elements, ids)
+
+    def rename(self) -> None:
+        """Let the user name what is selected in the tree, in its place."""
+        self._window.panels.docks["Project"].show()
+        self._window.panels.docks["Project"].raise_()
+        self._window.panels.tree.rename()
+
+    def take_name(self, scan_index: int, kind: NodeKind, item_id: int, name: str) -> None:
+        """Name a scan, or a run or an element of the active one."""
+        match kind:
+            case NodeKind.SCAN:
+                self._window.do(element_commands.rename_scan, scan_index, name)
+            case NodeKind.RUN:
+                self._window.do(element_commands.rename_run, item_id, name)
+            case NodeKind.ELEMENT:
+                self._window.do(element_commands.rename_element, item_id, name)
+
+    def hide(self) -> None:
+        """Hide the selected elements."""
+        self._window.do(commands.set_hidden, self._targets()[2], True)
+
+    def show_menu(self, kind: NodeKind, position: QPoint) -> None:
+        """Offer what can be done with the selected row of the tree."""
+        menu = QMenu(self._window)
+        menu.setObjectName("context")
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        for name in CONTEXT_MENUS[kind]:
+            if name:
+                menu.addAction(self._window.actions_[name])
+            else:
+                menu.addSeparator()
+        menu.popup(position)
+
+    def size(self) -> None:
+        """Ask for the catalogue size of the selected element."""
+        window = self._window
+        _, result, [element_id] = self._targets()
+        element = result.element(element_id)
+        sizes = sizes_of(str(result.settings.elements.catalogue))
+        names = [tr(NO_SIZE)]
+        for s in sizes:
+            od = tr("OD {od:.1f} mm").format(od=1000 * s.outside_diameter)
+            names.append(f"{s.name} · {od}")
+        nearest = min(sizes, key=lambda s: abs(s.outside_diameter - 2 * element.radius))
+        here = 1 + sizes.index(element.nominal if element.nominal in sizes else nearest)
+        measured = format_measure(2000 * element.radius, 2000 * element.radius_sd, "mm")
+        self._choose(
+            tr("Nominal size"),
+            tr("{label} measures OD {measured}. It is:").format(
+                label=label_of(element), measured=measured
+            ),
+            names,
+            here,
+            lambda i: window.do(
+                element_commands.set_nominal_size, element_id, sizes[i - 1] if i else None
+            ),
+        )
+
+    def review(self, state: ReviewState) -> None:
+        """Accept or reject the selected deformation, or leave it open."""
+        deformation_id = self._window.document.selection.deformation_id
+        if deformation_id:
+            self._window.do(commands.set_review, [deformation_id], state)
+
+    # In the background
+
+    def merge(self) -> None:
+        """Make one element of the selected ones."""
+        from pipecore.editing import merge_elements  # noqa: PLC0415 - loads numba
+
+        _, result, ids = self._targets()
+        names = tr(" and ").join(label_of(result.element(i)) for i in ids)
+        self._reshape(
+            tr("Merging"),
+            tr("Merge {names}").format(names=names),
+            lambda c, r, p: merge_elements(c, r, ids, p),
+        )
+
+    def split(self) -> None:
+        """Ask where to split the selected element."""
+        window = self._window
+        _, result, [element_id] = self._targets()
+        element = result.element(element_id)
+        length = element.axis.length
+        dialog = QInputDialog(window)
+        dialog.setWindowTitle(tr("Split element"))
+        dialog.setInputMode(QInputDialog.InputMode.DoubleInput)
+        dialog.setLabelText(
+            tr("Split {label} ({length:.3f} m long) at chainage, m:").format(
+                label=label_of(element), length=length
+            )
+        )
+        dialog.setDoubleRange(0.0, length)
+        dialog.setDoubleDecimals(3)
+        dialog.setDoubleStep(0.01)
+        dialog.setDoubleValue(self._shown_chainage(result, length / 2))
+        dialog.doubleValueSelected.connect(lambda s: self._split_at(element_id, s))
+        self._open(dialog)
+
+    def _shown_chainage(self, result: Result, otherwise: float) -> float:
+        """Chainage of the selected profile or deformation."""
+        selection = self._window.document.selection
+        if selection.profile is not None:
+            rows = result.profiles.of_element(selection.element_id, selection.profile.stack_id)
+            return float(rows.chainage[rows.profile_index == selection.profile.profile_index][0])
+        if selection.deformation_id:
+            return result.deformation(selection.deformation_id).chainage
+        return otherwise
+
+    def _split_at(self, element_id: int, chainage: float) -> None:
+        from pipecore.editing import split_element  # noqa: PLC0415 - loads numba
+
+        self._reshape(
+            tr("Splitting"),
+            tr("Split {label}").format(label=self._label(element_id)),
+            lambda c, r, p: split_element(c, r, element_id, chainage, p),
+        )
+
+    def kind(self) -> None:
+        """Ask what the selected element is."""
+        from pipecore.editing import kinds_of  # noqa: PLC0415 - loads numba
+
+        _, result, [element_id] = self._targets()
+        element = result.element(element_id)
+        kinds = kinds_of(element)
+        self._choose(
+            tr("Kind of element"),
+            tr("{label} is a:").format(label=label_of(element)),
+            [tr(kind) for kind in kinds],
+            kinds.index(element.kind) if element.kind in kinds else 0,
+            lambda i: self._change_kind(element_id, kinds[i]),
+        )
+
+    def _change_kind(self, element_id: int, kind: ElementKind) -> None:
+        from pipecore.editing import change_kind  # noqa: PLC0415 - loads numba
+
+        _, result, _ = self._targets()
+        if result.element(element_id).kind is not kind:
+            self._reshape(
+                tr("Measuring"),
+                tr("Change {label} to {kind}").format(label=self._label(element_id), kind=kind),
+                lambda c, r, p: change_kind(c, r, element_id, kind, p),
+            )
+
+    def detect_around(self) -> None:
+        """Detect again around the selected elements, with the present settings."""
+        from pipecore import editing  # noqa: PLC0415 - loads numba
+        from pipecore.pipeline import STAGES  # noqa: PLC0415
+
+        _, result, ids = self._targets()
+        names = ", ".join(label_of(result.element(i)) for i in ids[:3]) + (
+            "…" if len(ids) > 3 else ""
+        )
+        settings = self._window.document.settings
+
+        def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
+            progress.expect(STAGES)
+            index = editing.points_around(cloud, result, ids)
+            return editing.detect_again(cloud, result, index, settings, progress, ids)
+
+        self._reshape(
+            tr("Detecting again"),
+            tr("Detect again around {names}").format(names=names),
+            change,
+            expected=False,
+        )
+
+    def detect_in_box(self) -> None:
+        """Detect again in the clipping box, with the present settings."""
+        from pipecore import editing  # noqa: PLC0415 - loads numba
+        from pipecore.pipeline import STAGES  # noqa: PLC0415
+
+        box, settings = self._window.document.view.clip_box, self._window.document.settings
+        assert box is not None
+
+        def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
+            progress.expect(STAGES)
+            index = editing.points_in_box(cloud, box.low, box.high)
+            return editing.detect_again(cloud, result, index, settings, progress)
+
+        self._reshape(
+            tr("Detecting in the box"), tr("Detect again in the box"), change, expected=False
+        )
+
+    def take(self, edited: Edited) -> None:
+        """Take what was worked out, unless the result has been changed meanwhile."""
+        window = self._window
+        if element_commands.place_of(window.document, edited.cloud, edited.before) is None:
+            window.panels.message.tell(
+                tr(
+                    "“{text}” was dropped: the elements were changed meanwhile. Do it again."
+                ).format(text=edited.text),
+                "warning",
+            )
+            return
+        before, after = edited.before, edited.after
+        window.do(element_commands.take_edit, edited.cloud, before, after, edited.text)
+        window.panels.message.tell(
+            tr("{text}: done. {difference}")
+            .format(text=edited.text, difference=_difference(before, after))
+            .strip()
+        )
+
+    def _reshape(self, title: str, text: str, change: Reshape, *, expected: bool = True) -> None:
+        scan, result, _ = self._targets()
+        cloud = scan.cloud
+
+        def work(progress: JobProgress) -> Result:
+            from pipecore.editing import STAGES  # noqa: PLC0415 - loads numba
+
+            if expected:
+                progress.expect(STAGES)
+            return change(cloud, result, progress)
+
+        self._window.jobs.edit(title, text, cloud, result, work)
+
+    # Asking
+
+    def _label(self, element_id: int) -> str:
+        _, result, _ = self._targets()
+        return label_of(result.element(element_id))
+
+    def _choose(
+        self, title: str, label: str, names: list[str], here: int, take: Callable[[int], object]
+    ) -> None:
+        dialog = QInputDialog(self._window)
+        dialog.setWindowTitle(title)
+        dialog.setLabelText(label)
+        dialog.setComboBoxItems(names)
+        dialog.setTextValue(names[here])
+        dialog.textValueSelected.connect(lambda name: take(names.index(name)))
+        self._open(dialog)
+
+    def _open(self, dialog: QInputDialog) -> None:
+        dialog.setObjectName("ask")
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.open()
+
+
+def _difference(before: Result, after: Result) -> str:
+    """Say which elements are new, with their measures."""
+    known = {id(e) for e in before.elements}
+    new = [e for e in after.elements if id(e) not in known]
+    if not 1 <= len(new) <= 3:
+        return ""
+    return "; ".join(
+        f"{label_of(e)}: r {format_measure(1000 * e.radius, 1000 * e.radius_sd, 'mm')}, "
+        f"{e.axis.length:.2f} m"
+        for e in new
+    )

@@ -1,0 +1,122 @@
+"""Asking for files: what to open, where to export to, which ones were open lately."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QSettings, QStandardPaths
+from PySide6.QtWidgets import QFileDialog, QWidget
+
+from pipecore.io import file_filter
+from pipegui.i18n.texts import tr
+from pipegui.project.project_file import SUFFIX
+
+N_RECENT = 10
+
+
+def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
+    """Ask for scans to open."""
+    names, _ = QFileDialog.getOpenFileNames(
+        parent,
+        tr("Open laser scans"),
+        _last_folder(settings),
+        _scans_filter() + ";;" + tr("Projects (*{suffix})").format(suffix=SUFFIX),
+    )
+    paths = [Path(name) for name in names]
+    if paths:
+        settings.setValue("files/folder", str(paths[0].parent))
+    return paths
+
+
+def ask_scan(parent: QWidget, settings: QSettings, name: str) -> Path | None:
+    """Ask where a scan is."""
+    found, _ = QFileDialog.getOpenFileName(
+        parent, tr("Locate “{name}”").format(name=name), _last_folder(settings), _scans_filter()
+    )
+    return Path(found) if found else None
+
+
+def ask_project(parent: QWidget, settings: QSettings) -> Path | None:
+    """Ask for a project to open."""
+    name, _ = QFileDialog.getOpenFileName(
+        parent,
+        tr("Open project"),
+        _last_folder(settings),
+        tr("Projects (*{suffix})").format(suffix=SUFFIX),
+    )
+    if not name:
+        return None
+    settings.setValue("files/folder", str(Path(name).parent))
+    return Path(name)
+
+
+def ask_settings(parent: QWidget, settings: QSettings) -> Path | None:
+    """Ask for a settings file to load."""
+    name, _ = QFileDialog.getOpenFileName(
+        parent, tr("Load settings"), _last_folder(settings), tr("Settings (*.toml)")
+    )
+    return Path(name) if name else None
+
+
+def ask_target(
+    parent: QWidget, settings: QSettings, title: str, name: str, name_filter: str
+) -> Path | None:
+    """Ask where to write a file; `name` is proposed, with its ending."""
+    proposed = Path(_last_folder(settings)) / name
+    chosen, _ = QFileDialog.getSaveFileName(parent, title, str(proposed), name_filter)
+    if not chosen:
+        return None
+    path = Path(chosen)
+    settings.setValue("files/folder", str(path.parent))
+    return path if path.suffix else path.with_suffix(Path(name).suffix)
+
+
+def ask_report_folder(parent: QWidget, settings: QSettings, name: str) -> Path | None:
+    """Ask for the folder in which a report's own folder `name` is made."""
+    chosen = QFileDialog.getExistingDirectory(
+        parent, tr("Make the report folder in"), _last_folder(settings)
+    )
+    if not chosen:
+        return None
+    settings.setValue("files/folder", chosen)
+    return _vacant(Path(chosen) / name)
+
+
+def _vacant(folder: Path) -> Path:
+    """`folder`, numbered where it is there already, so that no report is overwritten."""
+    number, vacant = 1, folder
+    while vacant.exists():
+        number += 1
+        vacant = folder.with_name(f"{folder.name} {number}")
+    return vacant
+
+
+def recent(settings: QSettings) -> list[Path]:
+    """Return the scans and projects opened last that are still there, the latest first."""
+    stored = settings.value("files/recent", [])
+    # A list of one comes back as plain text.
+    names = [stored] if isinstance(stored, str) else stored
+    if not isinstance(names, list):
+        return []
+    return [path for path in map(Path, names) if path.is_file()]
+
+
+def remember(settings: QSettings, path: Path) -> None:
+    """Put a scan or project at the top of the recent ones."""
+    paths = [path.resolve(), *(p for p in recent(settings) if p != path.resolve())]
+    settings.setValue("files/recent", [str(p) for p in paths[:N_RECENT]])
+
+
+def preset_folder() -> Path:
+    """Return the folder of the settings that the user keeps by name."""
+    place = QStandardPaths.StandardLocation.AppDataLocation
+    return Path(QStandardPaths.writableLocation(place)) / "presets"
+
+
+def _last_folder(settings: QSettings) -> str:
+    folder = settings.value("files/folder", "")
+    return str(folder) if folder and Path(str(folder)).is_dir() else str(Path.home())
+
+
+def _scans_filter() -> str:
+    """The core's filter of kinds of files; what is no name of a format is translated."""
+    kinds = [kind.partition(" (") for kind in file_filter().split(";;")]
+    return ";;".join(f"{tr(name)}{opening}{endings}" for name, opening, endings in kinds)

@@ -1,0 +1,1 @@
+"""What the user works on, without Qt: document, history, commands, selection, queries."""

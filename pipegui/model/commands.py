@@ -1,0 +1,398 @@
+"""What the user can do to a document: functions from a document to the next one.
+
+A command with `undo_text` is a step that can be undone; the others (looking, selecting)
+only move the present. Qt-free.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from pipecore.report.summary import by_verdict
+from pipecore.settings import DirectionPreset, Settings
+from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
+from pipegui.i18n.texts import mark
+from pipegui.model import presets
+from pipegui.model import selection as selecting
+from pipegui.model.document import (
+    ColourBy,
+    Document,
+    ProfileKey,
+    Scan,
+    Selection,
+    Tool,
+    ViewOptions,
+)
+
+Command = TypeVar("Command", bound=Callable[..., Document])
+
+MAX_PINNED = 6
+"""Elements that can be compared in one plot."""
+
+NEEDS_RESULT = {
+    ColourBy.SEGMENT,
+    ColourBy.ELEMENT,
+    ColourBy.KIND,
+    ColourBy.DEVIATION,
+    ColourBy.PROFILE,
+    ColourBy.VERDICT,
+}
+
+
+def step(undo_text: str | Callable[..., str]) -> Callable[[Command], Command]:
+    """Mark a command as a step of the history, with what its undoing is called.
+
+    A function is given what the command is, before it is carried out.
+    """
+
+    def marked(command: Command) -> Command:
+        command.undo_text = undo_text  # type: ignore[attr-defined]
+        return command
+
+    return marked
+
+
+# Scans and results
+
+
+@step(mark("Open"))
+def open_scan(document: Document, scan: Scan) -> Document:
+    """Add a scan and look at it."""
+    return activate_scan(replace(document, scans=(*document.scans, scan)), len(document.scans))
+
+
+@step(mark("Close"))
+def close_scan(document: Document, index: int) -> Document:
+    """Remove a scan; the one before it is looked at."""
+    scans = document.scans[:index] + document.scans[index + 1 :]
+    return activate_scan(replace(document, scans=scans, active=0), max(index - 1, 0))
+
+
+def activate_scan(document: Document, index: int) -> Document:
+    """Look at another scan."""
+    document = replace(document, active=index, selection=Selection())
+    view = replace(
+        document.view,
+        hidden_elements=frozenset(),
+        shown_stack=NO_ID,
+        shown_profile=None,
+        pinned_elements=(),
+        clip_box=None,
+        tool=Tool.SELECT,
+        measurements=(),
+        measuring_from=None,
+        height_limits=None,
+        intensity_limits=None,
+    )
+    if document.scan is not None and view.colour_by not in colours_of(document.scan):
+        view = replace(view, colour_by=colours_of(document.scan)[0])
+    return replace(document, view=view)
+
+
+def step_scan(document: Document) -> Document:
+    """Look at the next open scan."""
+    return activate_scan(document, (document.active + 1) % max(len(document.scans), 1))
+
+
+@step(mark("Detect"))
+def set_result(document: Document, cloud: PointCloud, result: Result) -> Document:
+    """Take the result of a detection on `cloud`; keeps the selection, else shows the worst dent.
+
+    The scan may have been closed meanwhile: then nothing changes.
+    """
+    index = next((i for i, scan in enumerate(document.scans) if scan.cloud is cloud), None)
+    if index is None:
+        return document
+    old = document.scans[index].result
+    scans = list(document.scans)
+    reviews = selecting.reviews_carried_over(scans[index].reviews, old, result)
+    scans[index] = replace(scans[index], result=result, reviews=reviews)
+    selection = document.selection
+    if index == document.active:
+        selection = selecting.carried_over(selection, old, result)
+        if selection == Selection():
+            selection = selecting.of_deformation(result, selecting.worst_deformation(result))
+    view = document.view
+    if index == document.active:
+        colour = view.colour_by if view.colour_by in NEEDS_RESULT else ColourBy.DEVIATION
+        view = replace(view, colour_by=colour, hidden_elements=frozenset(), shown_stack=NO_ID)
+        view = replace(view, pinned_elements=())  # their numbers mean others now
+        if colour is ColourBy.PROFILE:
+            view = replace(view, colour_by=ColourBy.DEVIATION)
+    return replace(document, scans=tuple(scans), selection=selection, view=view)
+
+
+# Reviewing
+
+
+@step(mark("Review"))
+def set_review(document: Document, deformation_ids: Iterable[int], state: ReviewState) -> Document:
+    """Accept deformations, reject them, or leave them open again."""
+    return _reviewed(document, {i: {"state": state} for i in deformation_ids})
+
+
+@step(mark("Comment"))
+def set_comment(document: Document, deformation_id: int, comment: str) -> Document:
+    """Say something about a deformation."""
+    return _reviewed(document, {deformation_id: {"comment": comment.strip()}})
+
+
+def _reviewed(document: Document, changes: Mapping[int, Mapping[str, Any]]) -> Document:
+    scan = document.scan
+    if scan is None:
+        return document
+    changed = {i: replace(scan.review(i), **change) for i, change in changes.items()}
+    reviews = {i: r for i, r in (dict(scan.reviews) | changed).items() if r != Review()}
+    if reviews == scan.reviews:
+        return document
+    return _with_scan(document, replace(scan, reviews=reviews))
+
+
+def _with_scan(document: Document, scan: Scan) -> Document:
+    """Put a scan in the place of the active one."""
+    scans = list(document.scans)
+    scans[document.active] = scan
+    return replace(document, scans=tuple(scans))
+
+
+def colours_of(scan: Scan) -> tuple[ColourBy, ...]:
+    """What a scan's points can be coloured by, the most telling first."""
+    has = {
+        ColourBy.RGB: scan.cloud.rgb is not None,
+        ColourBy.INTENSITY: scan.cloud.intensity is not None,
+        ColourBy.HEIGHT: True,
+    } | dict.fromkeys(
+        (
+            ColourBy.DEVIATION,
+            ColourBy.VERDICT,
+            ColourBy.ELEMENT,
+            ColourBy.KIND,
+            ColourBy.SEGMENT,
+            ColourBy.PROFILE,
+        ),
+        scan.result is not None,
+    )
+    return tuple(colour for colour, there in has.items() if there)
+
+
+# Selecting
+
+
+def select(document: Document, selection: Selection) -> Document:
+    """Select something."""
+    return replace(document, selection=selection)
+
+
+def select_run(document: Document, run_id: int) -> Document:
+    """Select a run."""
+    return select(document, Selection(run_id=run_id))
+
+
+def select_element(document: Document, element_id: int) -> Document:
+    """Select an element."""
+    if document.result is None:
+        return document
+    return select(document, selecting.of_element(document.result, element_id))
+
+
+def select_deformation(document: Document, deformation_id: int) -> Document:
+    """Select a deformation and its element."""
+    if document.result is None:
+        return document
+    return select(document, selecting.of_deformation(document.result, deformation_id))
+
+
+def select_point(document: Document, point_index: int) -> Document:
+    """Select the element that a point of the cloud belongs to; nothing for -1."""
+    if document.result is None:
+        return document
+    element_id = NO_ID if point_index < 0 else int(document.result.element_id[point_index])
+    return select_element(document, element_id)
+
+
+def select_profile(document: Document, stack_id: int, profile_index: int) -> Document:
+    """Select a profile of the selected element, within the selected deformation if any."""
+    selection = replace(document.selection, profile=ProfileKey(stack_id, profile_index))
+    return select(document, selection)
+
+
+def select_spot(document: Document, chainage: float, clock: float) -> Document:
+    """Select what is at a spot of the selected element's surface."""
+    if document.result is None or not document.selection.element_id:
+        return document
+    spot = selecting.of_spot(document.result, document.selection.element_id, chainage, clock)
+    return select(document, spot)
+
+
+def select_parent(document: Document) -> Document:
+    """Go up: profile → deformation → element → run → nothing."""
+    return select(document, document.selection.parent())
+
+
+def step_profile(document: Document, by: int) -> Document:
+    """Select the next (+1) or previous (-1) profile of the stack that is shown."""
+    result, selection = document.result, document.selection
+    shown = selecting.shown_profile(result, selection) if result else None
+    if result is None or shown is None:
+        return document
+    rows = result.profiles.of_element(selection.element_id, shown.stack_id)
+    here = int(np.flatnonzero(rows.profile_index == shown.profile_index)[0])
+    there = min(max(here + by, 0), len(rows) - 1)
+    return select_profile(document, shown.stack_id, int(rows.profile_index[there]))
+
+
+def step_deformation(document: Document, by: int) -> Document:
+    """Select the next (+1) or previous (-1) deformation, in order of urgency."""
+    if document.result is None or not document.result.deformations:
+        return document
+    ids = [d.deformation_id for d in by_verdict(document.result)]
+    current = document.selection.deformation_id
+    place = (ids.index(current) + by) % len(ids) if current in ids else 0
+    return select_deformation(document, ids[place])
+
+
+# Settings and stacks
+
+
+@step(mark("Change settings"))
+def change_settings(document: Document, changes: Mapping[str, Any]) -> Document:
+    """Change settings by dotted key; raises `SettingsError` if a value does not fit."""
+    return replace(document, settings=document.settings.replace(changes))
+
+
+@step(mark("Reset settings"))
+def reset_settings(document: Document) -> Document:
+    """Back to the defaults, own stacks excepted."""
+    stacks = {"stacks.directions": document.settings.stacks.directions}
+    return replace(document, settings=Settings().replace(stacks))
+
+
+@step(mark("Reset settings"))
+def reset_keys(document: Document, keys: Iterable[str]) -> Document:
+    """Set some settings back to their defaults, by dotted key."""
+    defaults = Settings()
+    return change_settings(document, {key: defaults.get(key) for key in keys})
+
+
+@step(mark("Preset"))
+def apply_preset(document: Document, settings: Settings) -> Document:
+    """Take the settings of a preset; what belongs to the scan stays."""
+    return replace(document, settings=presets.applied(document.settings, settings))
+
+
+@step(mark("Load settings"))
+def load_settings(document: Document, settings: Settings) -> Document:
+    """Take settings from elsewhere."""
+    return replace(document, settings=settings)
+
+
+@step(mark("Change directions"))
+def set_preset(document: Document, preset: DirectionPreset) -> Document:
+    """Choose which stacks are cut besides the user's own."""
+    return change_settings(document, {"stacks.preset": preset})
+
+
+@step(mark("Add stack"))
+def add_stack(document: Document, direction: tuple[float, ...]) -> Document:
+    """Add an own stack: (x, y, z) or (x, y, z, width in mm)."""
+    directions = (*document.settings.stacks.directions, direction)
+    return change_settings(document, {"stacks.directions": directions})
+
+
+@step(mark("Edit stack"))
+def edit_stack(document: Document, index: int, direction: tuple[float, ...]) -> Document:
+    """Change an own stack."""
+    directions = list(document.settings.stacks.directions)
+    directions[index] = direction
+    return change_settings(document, {"stacks.directions": tuple(directions)})
+
+
+@step(mark("Remove stack"))
+def remove_stack(document: Document, index: int) -> Document:
+    """Remove an own stack."""
+    directions = document.settings.stacks.directions
+    directions = directions[:index] + directions[index + 1 :]
+    return change_settings(document, {"stacks.directions": directions})
+
+
+# Looking
+
+
+def set_view(document: Document, **changes: Any) -> Document:
+    """Change how things are shown, by the names of `ViewOptions`."""
+    return replace(document, view=replace(document.view, **changes))
+
+
+def show_stack(document: Document, stack_id: int) -> Document:
+    """Show one stack's profiles in colour; `NO_ID` goes back to the deviation."""
+    colour_by = ColourBy.DEVIATION if stack_id == NO_ID else ColourBy.PROFILE
+    return set_view(document, shown_stack=stack_id, shown_profile=None, colour_by=colour_by)
+
+
+def set_colour(document: Document, colour_by: ColourBy) -> Document:
+    """Choose what colour means; for profiles, the first stack if none is shown yet."""
+    if colour_by is ColourBy.PROFILE and document.result is not None:
+        stacks = document.result.stacks
+        shown = document.view.shown_stack or (stacks[0].stack_id if stacks else NO_ID)
+        return set_view(document, colour_by=colour_by, shown_stack=shown)
+    return set_view(document, colour_by=colour_by, shown_stack=NO_ID, shown_profile=None)
+
+
+def show_plot_stack(document: Document, stack_id: int) -> Document:
+    """Choose the stack of the radius plot; a selected profile of another stack is let go."""
+    document = set_view(document, plot_stack=stack_id)
+    profile = document.selection.profile
+    if profile is not None and profile.stack_id != stack_id:
+        return select_parent(document)
+    return document
+
+
+def toggle_pin(document: Document) -> Document:
+    """Keep the selected element in the radius plot, or no more; the oldest of too many goes."""
+    element_id, pinned = document.selection.element_id, document.view.pinned_elements
+    if not element_id:
+        return document
+    if element_id in pinned:
+        pinned = tuple(i for i in pinned if i != element_id)
+    else:
+        pinned = (*pinned, element_id)[-MAX_PINNED:]
+    return set_view(document, pinned_elements=pinned)
+
+
+@step(mark("Show or hide"))
+def set_hidden(document: Document, element_ids: Iterable[int], hidden: bool) -> Document:
+    """Hide elements, or show them again."""
+    before, ids = document.view.hidden_elements, frozenset(element_ids)
+    return set_view(document, hidden_elements=before | ids if hidden else before - ids)
+
+
+@step(mark("Isolate"))
+def isolate(document: Document) -> Document:
+    """Hide all elements but those of the selection."""
+    result, selection = document.result, document.selection
+    if result is None or selection == Selection():
+        return document
+    kept = set(selecting.elements_of(result, selection))
+    hidden = frozenset(e.element_id for e in result.elements) - kept
+    return set_view(document, hidden_elements=hidden)
+
+
+@step(mark("Show all"))
+def show_all(document: Document) -> Document:
+    """Show all hidden elements again."""
+    return set_view(document, hidden_elements=frozenset())
+
+
+def after_undo(present: Document, target: Document) -> Document:
+    """Return `target` seen as `present` is: undo changes the work, not where one looks."""
+    if present.scan is None or target.scan is None:
+        return target
+    if present.scan.cloud is not target.scan.cloud:
+        return target
+    view: ViewOptions = replace(present.view, hidden_elements=target.view.hidden_elements)
+    if view.colour_by not in colours_of(target.scan):
+        view = replace(view, colour_by=target.view.colour_by, shown_stack=NO_ID)
+    selection = selecting.carried_over(present.selection, present.result, target.result)
+    return replace(target, view=view, selection=selection)

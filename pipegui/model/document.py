@@ -1,0 +1,193 @@
+"""What the user works on: scans, results, selection and view options, all immutable.
+
+A command takes a `Document` and returns the next one; undo is going back to an
+earlier one. Nothing here knows Qt or VTK.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from pipecore.settings import LengthUnit, Settings
+from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
+from pipegui.model.fingerprint import Fingerprint
+
+
+class ColourBy(StrEnum):
+    """What the points' colour means."""
+
+    SEGMENT = "Segment"
+    ELEMENT = "Element"
+    KIND = "Kind"
+    DEVIATION = "Deviation"
+    HEIGHT = "Height"
+    INTENSITY = "Intensity"
+    RGB = "RGB"
+    PROFILE = "Profiles of a stack"
+    VERDICT = "Verdict"
+
+
+class Background(StrEnum):
+    """What lies behind the points."""
+
+    SYSTEM = "As the system"
+    LIGHT = "Light"
+    DARK = "Dark"
+    WHITE = "White"
+    BLACK = "Black"
+
+
+class Tool(StrEnum):
+    """What a click into the 3D view does."""
+
+    SELECT = "Select"
+    MEASURE = "Measure"
+    COORDINATES = "Coordinates"
+
+
+Point = tuple[float, float, float]
+Limits = tuple[float, float]
+"""The low and the high end of a range."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One point whose coordinates were asked for, or two with the distance between them.
+
+    Local coordinates of the active scan, metres.
+    """
+
+    start: Point
+    end: Point | None = None
+
+
+@dataclass(frozen=True)
+class ProfileKey:
+    """One profile of the selected element."""
+
+    stack_id: int
+    profile_index: int
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The one thing that is selected, with what contains it.
+
+    A selected profile or deformation implies its element; a selected element its run.
+    """
+
+    run_id: int = NO_ID
+    element_id: int = NO_ID
+    deformation_id: int = NO_ID
+    profile: ProfileKey | None = None
+    others: frozenset[int] = frozenset()
+    """More elements, for what is done with several; everything is shown of `element_id`."""
+
+    @property
+    def lead(self) -> "Selection":
+        """The one thing that is looked at, without the others."""
+        return replace(self, others=frozenset())
+
+    def parent(self) -> "Selection":
+        """What Esc goes to: profile → deformation → element → run → nothing."""
+        if self.others:
+            return replace(self, others=frozenset())
+        if self.profile is not None:
+            return replace(self, profile=None)
+        if self.deformation_id:
+            return replace(self, deformation_id=NO_ID)
+        if self.element_id:
+            return replace(self, element_id=NO_ID)
+        return Selection()
+
+
+@dataclass(frozen=True)
+class Box:
+    """An upright box in the local coordinates of the active scan, metres."""
+
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    is_inverted: bool = False
+    """Whether what lies outside is meant, not what lies within."""
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """How things are shown."""
+
+    colour_by: ColourBy = ColourBy.RGB
+    deviation_limit_mm: float = 10.0
+    hidden_elements: frozenset[int] = frozenset()
+    show_points: bool = True
+    show_axes: bool = True
+    show_ellipses: bool = False
+    show_surfaces: bool = False
+    show_labels: bool = True
+    shown_stack: int = NO_ID
+    """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
+    plot_stack: int = OWN_STACK
+    """The stack that the radius plot shows while no profile is selected."""
+    pinned_elements: tuple[int, ...] = ()
+    """Elements that stay in the radius plot."""
+    fly: bool = True
+    clip_box: Box | None = None
+    """Only what lies within is shown, or without if it is inverted."""
+    shown_profile: int | None = None
+    """The one profile of `shown_stack` that is shown in colour; None: all."""
+    point_size: float = 1.0
+    """Times the size that suits the points' spacing."""
+    is_parallel: bool = False
+    """Whether the 3D view is drawn without perspective."""
+    eye_dome: bool | None = None
+    """Whether steps in depth are shaded; None: where the hardware draws that fast."""
+    background: Background = Background.SYSTEM
+    tool: Tool = Tool.SELECT
+    measurements: tuple[Measurement, ...] = ()
+    measuring_from: Point | None = None
+    height_limits: Limits | None = None
+    """Local heights at the ends of the colours, metres; None: what nearly all points keep to."""
+    intensity_limits: Limits | None = None
+    """The same for intensities."""
+    """The first of two points, while the second is still to be picked."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A cloud with the result of its last detection, if any, and what a person says of it."""
+
+    name: str
+    cloud: PointCloud
+    result: Result | None = None
+    reviews: Mapping[int, Review] = field(default_factory=dict)
+    """By the ids of the deformations; those that nobody has looked at are not in it."""
+
+    length_unit: LengthUnit = LengthUnit.METRE
+    """In which the file was read."""
+
+    fingerprint: Fingerprint | None = None
+    """Of the file when the cloud was read; None if nobody took it."""
+
+    def review(self, deformation_id: int) -> Review:
+        """Return what a person said of a deformation, or that it is open."""
+        return self.reviews.get(deformation_id, Review())
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """All of the user's work."""
+
+    scans: tuple[Scan, ...] = ()
+    active: int = 0
+    settings: Settings = field(default_factory=Settings)
+    selection: Selection = Selection()
+    view: ViewOptions = ViewOptions()
+
+    @property
+    def scan(self) -> Scan | None:
+        """The scan that is looked at."""
+        return self.scans[self.active] if self.scans else None
+
+    @property
+    def result(self) -> Result | None:
+        """The result that is looked at."""
+        return self.scan.result if self.scan else None

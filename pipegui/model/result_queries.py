@@ -1,0 +1,172 @@
+"""Cuts out of a result: the profiles, points and deformations of one element.
+
+Made once and kept for the few elements last looked at, because equality of view states
+stands on their identity. Results themselves live in the history. Qt-free.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.errors import SettingsError
+from pipecore.geometry import Array, surface_points
+from pipecore.rules import Measure, Rule, load_rule, outside_diameter
+from pipecore.types import (
+    OWN_STACK,
+    Deformation,
+    DeformationKind,
+    PointCloud,
+    Profiles,
+    Result,
+)
+from pipegui.i18n.texts import tr
+from pipegui.model.document import ProfileKey
+
+
+@lru_cache(maxsize=8)
+def count_profiles(result: Result) -> tuple[int, ...]:
+    """Return the number of profiles with an accepted ellipse, per stack."""
+    return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
+
+
+@lru_cache(maxsize=8)
+def profile_indices(result: Result, stack_id: int) -> NDArray[np.int32]:
+    """Return the profiles of a stack that have an accepted ellipse, in their order."""
+    profiles = result.profiles
+    return np.unique(profiles.profile_index[profiles.stack_id == stack_id])
+
+
+@lru_cache(maxsize=32)
+def deformations_of(result: Result, element_id: int) -> tuple[Deformation, ...]:
+    """Return the deformations of one element."""
+    return result.deformations_of(element_id)
+
+
+@lru_cache(maxsize=32)
+def profiles_of(result: Result, element_id: int) -> Profiles:
+    """Return the profiles of one element, of every stack."""
+    return result.profiles.of_element(element_id)
+
+
+@lru_cache(maxsize=32)
+def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
+    """Return one profile as a table of one row, None if it is not there."""
+    rows = profiles_of(result, element_id)
+    row = (rows.stack_id == key.stack_id) & (rows.profile_index == key.profile_index)
+    return rows[np.flatnonzero(row)[:1]] if row.any() else None
+
+
+@lru_cache(maxsize=32)
+def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
+    """Stacks with profiles of this element: its own first, then by number of profiles."""
+    ids, counts = np.unique(profiles_of(result, element_id).stack_id, return_counts=True)
+    choices = [
+        (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
+    ]
+    return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
+
+
+@lru_cache(maxsize=32)
+def plotted_profiles(result: Result, element_id: int) -> Profiles:
+    """Profiles of an element's own stack, or of that with most of them."""
+    rows, choices = profiles_of(result, element_id), stack_choices(result, element_id)
+    return rows[rows.stack_id == choices[0][0]] if choices else rows
+
+
+@dataclass(frozen=True)
+class DentLimit:
+    """How deep a dent may be, metres, and what says so."""
+
+    depth: float
+    text: str
+
+
+@lru_cache(maxsize=4)
+def _rule(name: str) -> Rule | None:
+    try:
+        return load_rule(name)
+    except SettingsError:  # the user's own file may be gone since
+        return None
+
+
+@lru_cache(maxsize=32)
+def dent_limit(result: Result, element_id: int) -> DentLimit | None:
+    """The strictest limit that the result's rule sets on the depth of an element's dents."""
+    rule, element = _rule(result.settings.deformation.rule), result.element(element_id)
+    if rule is None:
+        return None
+    in_metres = {
+        Measure.DEPTH_MM: 1e-3,
+        Measure.DEPTH_PCT_OD: outside_diameter(element) / 100,
+        Measure.DEPTH_PCT_LENGTH: element.axis.length / 100,
+    }
+    limits = [
+        DentLimit(criterion.limit * in_metres[criterion.measure], f"{tr(rule.title)}\n{criterion}")
+        for criterion in rule.criteria
+        if criterion.measure in in_metres and criterion.covers(DeformationKind.DENT, element)
+    ]
+    return min(limits, key=lambda limit: limit.depth, default=None)
+
+
+def stack_name(result: Result, stack_id: int) -> str:
+    """What people call a stack."""
+    if stack_id == OWN_STACK:
+        return tr("Across the axis")
+    stack = next((s for s in result.stacks if s.stack_id == stack_id), None)
+    return (
+        stack.name
+        if stack is not None and stack.name
+        else tr("Stack {stack_id}").format(stack_id=stack_id)
+    )
+
+
+@lru_cache(maxsize=4)
+def surface_of(
+    cloud: PointCloud, result: Result, element_id: int
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Chainage, clock, deviation and index in the cloud of one element's points."""
+    index = np.flatnonzero(result.element_id == element_id)
+    axis = result.element(element_id).axis
+    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index].astype(np.float64))
+    return chainage, clock, result.deviation[index].astype(np.float64), index
+
+
+@lru_cache(maxsize=8)
+def points_of_profile(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> Array:
+    """Points of the element that lie in one profile, float64."""
+    profile = profile_at(result, element_id, key)
+    assert profile is not None
+    chainages, _, _, index = surface_of(cloud, result, element_id)
+    if key.stack_id == OWN_STACK:
+        siblings = profiles_of(result, element_id)
+        siblings = siblings[siblings.stack_id == OWN_STACK]
+        # Neighbouring own profiles touch, so their spacing is their width.
+        width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
+        inside = np.abs(chainages - profile.chainage[0]) <= width / 2
+        return cloud.xyz[index[inside]].astype(np.float64)
+    stack = next(s for s in result.stacks if s.stack_id == key.stack_id)
+    xyz = cloud.xyz[index]
+    inside = stack.profile_index(xyz) == key.profile_index
+    # A stack's plane may cut a bend twice: only the branch of this profile counts.
+    near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
+    return xyz[inside & near].astype(np.float64)
+
+
+def spot_on_surface(result: Result, element_id: int, chainage: float, clock: float) -> Array:
+    """Local coordinates of a spot of an element's undeformed surface, shape (3,)."""
+    element = result.element(element_id)
+    radius = float(element.radius_at(chainage))
+    return np.asarray(surface_points(element.axis, [chainage], [radius], [clock])[0])
+
+
+def spot_of_point(
+    cloud: PointCloud, result: Result, element_id: int, point_index: int
+) -> tuple[float, float] | None:
+    """Chainage and clock of a point of the cloud on an element, None if it is not on it."""
+    if not element_id or point_index < 0 or int(result.element_id[point_index]) != element_id:
+        return None
+    xyz = cloud.xyz[point_index : point_index + 1].astype(np.float64)
+    chainage, _, clock = result.element(element_id).axis.pipe_coordinates(xyz)
+    return float(chainage[0]), float(clock[0])

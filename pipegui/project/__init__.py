@@ -1,0 +1,1 @@
+"""The project file: format, codec, validation, reference to the clouds."""

@@ -1,0 +1,390 @@
+"""Project files: all of the user's work in one file, the clouds by reference. Qt-free.
+
+A project is a zip archive of ``project.json`` and NumPy arrays (``.npy``, never
+pickled): format version 1. ``project.json`` holds what is small, the arrays of scan `i`
+lie in ``scans/i``: ``segment_id``, ``element_id`` and ``deviation`` by point, and the
+columns of the profiles in ``profiles``. A cloud is named by its path, relative to the
+project where that can be, and known again by its fingerprint. Keys may be added within
+a version; a reader refuses a larger one.
+"""
+
+import json
+import os
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pipecore
+from pipecore.errors import PipecoreError
+from pipecore.io import write_file
+from pipecore.progress import NoProgress, Progress
+from pipecore.settings import Settings
+from pipecore.types import Deformation, Element, Profiles, Result, Review, Stack
+from pipegui.i18n.texts import tr
+from pipegui.model.document import Document, Scan, Selection, ViewOptions
+from pipegui.model.fingerprint import Fingerprint
+from pipegui.project.cloud_reference import CloudReference, CloudState
+from pipegui.project.json_codec import from_plain, to_plain
+from pipegui.project.validation import check_result
+
+SUFFIX = ".pipegui"
+FORMAT = "pipegui project"
+FORMAT_VERSION = 1
+CONTENTS = "project.json"
+POINT_ARRAYS = {"segment_id": np.int32, "element_id": np.int32, "deviation": np.float32}
+IN_PROFILES = {f.name for f in fields(Profiles)}
+IN_JSON: dict[str, Any] = {
+    "source": Path | None,
+    "n_cloud_points": int,
+    "stacks": tuple[Stack, ...],
+    "elements": tuple[Element, ...],
+    "deformations": tuple[Deformation, ...],
+    "seconds": dict[str, float],
+    "edits": tuple[str, ...],
+    "run_names": dict[int, str],
+    "own_settings": dict[int, Settings],
+    "settings": Settings,
+    "origin": NDArray[np.float64],
+}
+"""What of a result is kept as JSON, with its kinds."""
+
+Camera = Mapping[str, list[float]]
+
+
+class ProjectError(PipecoreError):
+    """A project file cannot be opened."""
+
+
+@dataclass(frozen=True, eq=False)
+class SavedScan:
+    """A scan as it is in the file: without its cloud."""
+
+    name: str
+    cloud: CloudReference
+    result: Result | None
+    reviews: Mapping[int, Review]
+
+    def with_cloud(
+        self, cloud: pipecore.PointCloud, fingerprint: Fingerprint | None = None
+    ) -> Scan:
+        """Return the scan with its cloud; `ProjectError` if that does not fit."""
+        if len(cloud) != self.cloud.n_points:
+            raise ProjectError(
+                tr(
+                    "“{source}” holds {cloud:,} points, but “{name}” had {n_points:,} when "
+                    "the project was saved: it is another scan."
+                ).format(
+                    source=cloud.source,
+                    cloud=len(cloud),
+                    name=self.name,
+                    n_points=self.cloud.n_points,
+                )
+            )
+        result = self.result and replace(self.result, source=cloud.source)
+        if result is not None and not np.allclose(result.origin, cloud.origin, rtol=0, atol=1e-6):
+            raise ProjectError(
+                tr(
+                    "“{source}” lies elsewhere than “{name}” did when the project was saved: "
+                    "it is another scan, or was read in another unit."
+                ).format(source=cloud.source, name=self.name)
+            )
+        return Scan(self.name, cloud, result, self.reviews, self.cloud.length_unit, fingerprint)
+
+
+@dataclass(frozen=True, eq=False)
+class SavedProject:
+    """A project as it is in its file."""
+
+    path: Path
+    scans: tuple[SavedScan, ...]
+    active: int
+    settings: Settings
+    selection: Selection = Selection()
+    view: ViewOptions = ViewOptions()
+    camera: Camera = field(default_factory=dict)
+    rescued_from: Path | None = None
+    """The project that an autosaved one belongs to."""
+
+    def located(self) -> list[tuple[Path, CloudState]]:
+        """Find the cloud of each scan."""
+        return [scan.cloud.locate(self.path.parent) for scan in self.scans]
+
+    def document(self, scans: tuple[Scan, ...]) -> Document:
+        """Return the document of the scans with their clouds; some may be left out."""
+        names = [s.name for s in self.scans]
+        wanted = names[self.active] if names else ""
+        active = next((i for i, s in enumerate(scans) if s.name == wanted), 0)
+        is_whole = len(scans) == len(self.scans)
+        document = Document(scans, active, self.settings)
+        if not is_whole or not scans:
+            return document
+        return replace(document, selection=self.selection, view=self.view)
+
+
+def work_of(document: Document) -> tuple[Any, ...]:
+    """What of a document is worth saving: where one looks is not."""
+    return document.scans, document.settings
+
+
+# Writing
+
+
+def write_project(
+    path: Path,
+    document: Document,
+    camera: Camera | None = None,
+    rescued_from: Path | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Write a project: the whole file or nothing.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written, or a cloud has no file.
+    CancelledError
+        From `progress`.
+    """
+    progress = progress or NoProgress()
+    folder = Path(os.path.realpath(path)).parent
+    scans = [_scan_to_plain(scan, folder) for scan in document.scans]
+    contents = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "program": pipecore.__version__,
+        "saved": datetime.now(UTC).isoformat(timespec="seconds"),
+        "rescued_from": to_plain(rescued_from),
+        "active": document.active,
+        "settings": to_plain(document.settings),
+        "selection": to_plain(document.selection),
+        "view": to_plain(document.view),
+        "camera": to_plain(dict(camera or {})),
+        "scans": scans,
+    }
+    with (
+        write_file(path) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
+    ):
+        archive.writestr(CONTENTS, json.dumps(contents, allow_nan=False, ensure_ascii=False))
+        arrays = list(_arrays(document))
+        for i, (name, array) in enumerate(arrays):
+            progress.update("saving", i / len(arrays))
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                _write_array(file, array, progress, i / len(arrays))
+
+
+def _write_array(file: Any, array: NDArray[Any], progress: Progress, done: float) -> None:
+    array = np.ascontiguousarray(array)
+    header = np.lib.format.header_data_from_array_1_0(array)
+    np.lib.format.write_array_header_1_0(file, header)
+    data = memoryview(array.reshape(-1).view(np.uint8)) if array.size else b""
+    for start in range(0, len(data), 1 << 22):
+        progress.update("saving", done)
+        file.write(data[start : start + (1 << 22)])
+
+
+def _scan_to_plain(scan: Scan, folder: Path) -> dict[str, Any]:
+    result = scan.result
+    plain: dict[str, Any] = {
+        "name": scan.name,
+        "cloud": to_plain(CloudReference.to(scan, folder)),
+        "reviews": to_plain(scan.reviews),
+        "result": None,
+    }
+    if result is not None:
+        plain["result"] = {name: to_plain(getattr(result, name)) for name in IN_JSON}
+    return plain
+
+
+def _arrays(document: Document) -> Iterator[tuple[str, NDArray[Any]]]:
+    for i, scan in enumerate(document.scans):
+        if scan.result is None:
+            continue
+        for name in POINT_ARRAYS:
+            yield f"scans/{i}/{name}", getattr(scan.result, name)
+        for f in fields(Profiles):
+            yield f"scans/{i}/profiles/{f.name}", getattr(scan.result.profiles, f.name)
+
+
+# Reading
+
+
+def read_project(path: Path, progress: Progress | None = None) -> SavedProject:
+    """Read a project file, without its clouds.
+
+    Raises
+    ------
+    ProjectError
+        If the file is not there, not a project, damaged, or of a newer program.
+    CancelledError
+        From `progress`.
+    """
+    progress = progress or NoProgress()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _read(Path(os.path.realpath(path)), archive, progress)
+    except PipecoreError:
+        raise
+    except FileNotFoundError as error:
+        raise ProjectError(tr("There is no file “{path}”.").format(path=path)) from error
+    except OSError as error:
+        raise ProjectError(
+            tr("“{path}” cannot be read ({reason}).").format(
+                path=path, reason=error.strerror or error
+            )
+        ) from error
+    except Exception as error:  # whatever a damaged file makes zip, JSON or NumPy raise
+        raise ProjectError(
+            tr("“{name}” is not a project, or is damaged ({error}).").format(
+                name=path.name, error=error
+            )
+        ) from error
+
+
+def _read(path: Path, archive: zipfile.ZipFile, progress: Progress) -> SavedProject:
+    contents = json.loads(archive.read(CONTENTS))
+    if not isinstance(contents, dict) or contents.get("format") != FORMAT:
+        raise ValueError("it says that it is something else")
+    version = contents.get("format_version")
+    if type(version) is not int or version < 1:
+        raise ValueError("it has no version")
+    if version > FORMAT_VERSION:
+        raise ProjectError(
+            tr(
+                "“{name}” was saved by a newer PipeGUI ({program}). Update this program to open it."
+            ).format(name=path.name, program=contents.get("program"))
+        )
+    plain_scans = contents["scans"]
+    scans = []
+    for i, plain in enumerate(plain_scans):
+        progress.update("opening", i / len(plain_scans))
+        scans.append(_scan_from_plain(plain, i, archive, progress))
+    active = from_plain(int, contents["active"])
+    if not 0 <= active < max(len(scans), 1):
+        raise ValueError("its active scan is not there")
+    selection, view = Selection(), ViewOptions()
+    try:
+        view = from_plain(ViewOptions, contents.get("view", {}))
+        selection = from_plain(Selection, contents.get("selection", {}))
+        _check_selection(selection, view, scans[active].result if scans else None)
+    except (ValueError, KeyError):
+        # Where one looked is not worth a project.
+        selection, view = Selection(), ViewOptions()
+    return SavedProject(
+        path,
+        tuple(scans),
+        active,
+        from_plain(Settings, contents["settings"]),
+        selection,
+        view,
+        _camera(contents.get("camera")),
+        from_plain(Path | None, contents.get("rescued_from")),
+    )
+
+
+def _scan_from_plain(
+    plain: Mapping[str, Any], number: int, archive: zipfile.ZipFile, progress: Progress
+) -> SavedScan:
+    reference = from_plain(CloudReference, plain["cloud"])
+    reviews = from_plain(Mapping[int, Review], plain["reviews"])
+    result = None
+    if plain["result"] is not None:
+        result = _result(plain["result"], reference, number, archive, progress)
+        known = {d.deformation_id for d in result.deformations}
+        if not set(reviews) <= known:
+            raise ValueError("a review is of a deformation that is not there")
+    elif reviews:
+        raise ValueError("there are reviews without deformations")
+    return SavedScan(from_plain(str, plain["name"]), reference, result, reviews)
+
+
+def _result(
+    plain: Mapping[str, Any],
+    reference: CloudReference,
+    number: int,
+    archive: zipfile.ZipFile,
+    progress: Progress,
+) -> Result:
+    values = {
+        name: from_plain(kind, plain[name]) for name, kind in IN_JSON.items() if name in plain
+    }
+    n_points = values.get("n_cloud_points")
+    if n_points != reference.n_points:
+        raise ValueError("the result is of another cloud")
+    for name, dtype in POINT_ARRAYS.items():
+        progress.update("opening", 0.0)
+        values[name] = _array(archive, f"scans/{number}/{name}", np.dtype(dtype), (n_points,))
+    values["profiles"] = _profiles(archive, number)
+    result = Result(**values)
+    check_result(result)
+    return result
+
+
+def _profiles(archive: zipfile.ZipFile, number: int) -> Profiles:
+    empty, names, columns = Profiles.empty(), set(archive.namelist()), {}
+    for column in sorted(IN_PROFILES):
+        name = f"scans/{number}/profiles/{column}"
+        # A column that came with a later version is left at its default.
+        if f"{name}.npy" in names:
+            model = getattr(empty, column)
+            columns[column] = _array(archive, name, model.dtype, (None, *model.shape[1:]))
+    profiles = Profiles(**columns)
+    if len({len(getattr(profiles, name)) for name in IN_PROFILES}) != 1:
+        raise ValueError("its profiles have columns of different length")
+    return profiles
+
+
+def _array(
+    archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any], shape: tuple[int | None, ...]
+) -> NDArray[Any]:
+    with archive.open(f"{name}.npy") as file:
+        if np.lib.format.read_magic(file) != (1, 0):
+            raise ValueError(f"{name} is of an unknown kind")
+        found, is_fortran, stored = np.lib.format.read_array_header_1_0(file)
+        fits = len(found) == len(shape) and all(
+            want in (None, have) for want, have in zip(shape, found, strict=True)
+        )
+        n_bytes = int(np.prod(found, dtype=object)) * dtype.itemsize
+        # Checked before anything of that size is asked of the memory.
+        n_stored = archive.getinfo(f"{name}.npy").file_size
+        if stored != dtype or is_fortran or not fits or n_bytes > n_stored:
+            raise ValueError(f"{name} has another shape")
+        data = file.read(n_bytes)
+        if len(data) != n_bytes or file.read(1):
+            raise ValueError(f"{name} is cut short")
+    return np.frombuffer(bytearray(data), dtype).reshape(found)
+
+
+def _check_selection(selection: Selection, view: ViewOptions, result: Result | None) -> None:
+    """Raise `KeyError` if something is selected or shown that is not there."""
+    wanted = {selection.element_id, *selection.others, *view.hidden_elements}
+    wanted = (wanted | {*view.pinned_elements}) - {0}
+    if result is None:
+        if wanted or selection != Selection():
+            raise KeyError("selection")
+        return
+    for element_id in wanted:
+        result.element(element_id)
+    if selection.deformation_id:
+        result.deformation(selection.deformation_id)
+    if selection.element_id and result.element(selection.element_id).run_id != selection.run_id:
+        raise KeyError("selection")
+    key = selection.profile
+    if key is not None:
+        rows = result.profiles.of_element(selection.element_id, key.stack_id)
+        if key.profile_index not in rows.profile_index:
+            raise KeyError("selection")
+
+
+def _camera(plain: Any) -> Camera:
+    try:
+        camera: Camera = from_plain(dict[str, list[float]], plain)
+    except ValueError:
+        return {}
+    return camera if all(np.isfinite(v).all() for v in camera.values()) else {}

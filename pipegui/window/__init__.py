@@ -1,0 +1,1 @@
+"""The shell: main window, docks, views, toolbar, actions, command palette, shortcuts."""

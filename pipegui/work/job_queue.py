@@ -1,0 +1,297 @@
+"""The long work of the window: reading, detecting, writing a report.
+
+Requests wait for one another. What a job makes is handed on as a signal; nothing here
+knows the document.
+"""
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from PySide6.QtCore import QObject, Signal
+
+from pipecore.errors import ReadError
+from pipecore.settings import Settings
+from pipecore.types import PointCloud, Result
+from pipegui.i18n.texts import tr
+from pipegui.model.document import Scan
+from pipegui.model.fingerprint import Fingerprint
+from pipegui.work.worker import (
+    Cancelled,
+    Event,
+    Failed,
+    Finished,
+    Glimpsed,
+    JobProgress,
+    Progressed,
+    Started,
+    Worker,
+)
+
+if TYPE_CHECKING:
+    from pipecore.preview import Plan
+
+ReadFunction = Callable[[Path, Settings, JobProgress], PointCloud]
+DetectFunction = Callable[[PointCloud, Settings, JobProgress], Result]
+PlanFunction = Callable[[PointCloud, Settings, JobProgress], "Plan | None"]
+
+
+def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointCloud:
+    """Read a scan with pipecore."""
+    from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
+
+    return read(path, length_unit=settings.input.length_unit, progress=progress, look=progress.look)
+
+
+def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -> Result:
+    """Detect with pipecore."""
+    from pipecore.pipeline import STAGES, detect  # noqa: PLC0415 - numba takes its time
+
+    progress.expect(STAGES)
+    return detect(cloud, settings, progress=progress)
+
+
+@dataclass(frozen=True, eq=False)
+class Edited:
+    """What became of a scan's result when it was changed by hand; `text` says what was done."""
+
+    cloud: PointCloud
+    before: Result
+    after: Result
+    text: str
+
+
+Change = Callable[[JobProgress], Result]
+"""Works out the next result."""
+
+
+def plan_cuts(cloud: PointCloud, settings: Settings, progress: JobProgress) -> "Plan | None":
+    """Tell with pipecore what a detection would cut."""
+    from pipecore.preview import plan_stacks  # noqa: PLC0415 - numba takes its time
+
+    return plan_stacks(cloud, settings, progress)
+
+
+@dataclass(frozen=True)
+class _Request:
+    title: str
+    """"" for a glance."""
+    work: Callable[[JobProgress], Any]
+    done: Callable[[Any], None]
+    failed: Callable[[str], None] | None = None
+    is_reading: bool = False
+
+    @property
+    def is_glance(self) -> bool:
+        return not self.title
+
+
+class Jobs(QObject):
+    """Runs requests one after the other and tells what came of them.
+
+    Scans that are opened while something else runs are read beside it.
+    """
+
+    busy_changed = Signal(bool)
+    started = Signal(str)
+    progressed = Signal(object)
+    """A `Progressed` event."""
+    glimpsed = Signal(object)
+    """A part of the cloud that is being read."""
+    cancelling = Signal()
+    ended = Signal()
+    cancelled = Signal(str)
+    """Title of the job."""
+    failed = Signal(str, str)
+    """Message, and details for a bug report."""
+
+    beside = Signal(str)
+    """What is read beside the running job; "" for no more."""
+
+    scan_read = Signal(object)
+    """A `Scan`."""
+    detected = Signal(object, object)
+    """The cloud and its `Result`."""
+    edited = Signal(object)
+    """`Edited`."""
+    written = Signal(object)
+    """Path of what was written."""
+
+    def __init__(
+        self,
+        read: ReadFunction = read_file,
+        detect: DetectFunction = detect_pipes,
+        plan: PlanFunction = plan_cuts,
+        parent: QObject | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self.read, self._detect = read, detect
+        self.plan = plan
+        self._waiting: deque[_Request] = deque()
+        self._glance: _Request | None = None
+        self._beside: Jobs | None = None
+        self._running: _Request | None = None
+        self.worker = Worker(self)
+        self.worker.happened.connect(self._take)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something that was asked for runs or waits; a glance does not count."""
+        return self._is_told_of or bool(self._waiting)
+
+    @property
+    def _is_told_of(self) -> bool:
+        """Whether what runs was asked for."""
+        return self._running is not None and not self._running.is_glance
+
+    @property
+    def title(self) -> str:
+        """What is being done that was asked for; "" while nothing is."""
+        if self._running is not None and self._is_told_of:
+            return self._running.title
+        return self._waiting[0].title if self._waiting else ""
+
+    def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
+        """Read each file as a scan of its own, without waiting for a detection."""
+        lane = self if self._running is None or self._running.is_reading else self._side_lane()
+        for path in paths:
+
+            def work(progress: JobProgress, path: Path = path) -> Scan:
+                fingerprint = Fingerprint.if_there(path)
+                cloud = self.read(path, settings, progress)
+                if not len(cloud):
+                    raise ReadError(tr("“{name}” holds no points.").format(name=path.name))
+                unit = settings.input.length_unit
+                return Scan(path.name, cloud, length_unit=unit, fingerprint=fingerprint)
+
+            title = tr("Reading {name}").format(name=path.name)
+            lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))
+
+    def _side_lane(self) -> "Jobs":
+        if self._running is not None and self._running.is_glance:
+            return self  # it makes way
+        if self._beside is None:
+            self._beside = Jobs(parent=self)
+            self._beside.started.connect(self.beside)
+            self._beside.ended.connect(lambda: self.beside.emit(""))
+            self._beside.cancelled.connect(self.cancelled)
+            self._beside.failed.connect(self.failed)
+        return self._beside
+
+    def detect(self, cloud: PointCloud, settings: Settings) -> None:
+        """Detect on a cloud."""
+
+        def work(progress: JobProgress) -> Result:
+            return self._detect(cloud, settings, progress)
+
+        self._request(_Request(tr("Detecting"), work, lambda r: self.detected.emit(cloud, r)))
+
+    def edit(
+        self, title: str, text: str, cloud: PointCloud, before: Result, change: Change
+    ) -> None:
+        """Change a result by hand, where that takes its time."""
+
+        def done(after: Result) -> None:
+            self.edited.emit(Edited(cloud, before, after, text))
+
+        self._request(_Request(title, change, done))
+
+    def run(
+        self, title: str, work: Callable[[JobProgress], Any], done: Callable[[Any], None]
+    ) -> None:
+        """Do anything else that takes its time, and hand what it makes to `done`."""
+        self._request(_Request(title, work, done))
+
+    def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
+        """Write something that takes its time."""
+        self._request(_Request(tr("Exporting"), write, lambda _: self.written.emit(path)))
+
+    def glance(
+        self,
+        work: Callable[[JobProgress], Any],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Do something small once nothing else runs; nobody is told of it but the caller.
+
+        A newer glance takes its place, and work that is asked for goes before it.
+        """
+        self._glance = _Request("", work, done, failed)
+        if self._running is None:
+            self._next()
+        elif self._running.is_glance:
+            self.worker.cancel()
+
+    def cancel(self) -> None:
+        """Stop what runs, and forget what waits."""
+        self._waiting.clear()
+        if self._beside is not None:
+            self._beside.cancel()
+        if self._running is not None:
+            if self._is_told_of:
+                self.cancelling.emit()
+            self.worker.cancel()
+
+    def close(self) -> None:
+        """Stop everything and wait for the worker's thread."""
+        self._waiting.clear()
+        if self._beside is not None:
+            self._beside.close()
+        self.worker.happened.disconnect(self._take)
+        self.worker.close()
+
+    def _request(self, request: _Request) -> None:
+        self._waiting.append(request)
+        if self._running is None:
+            self._next()
+        elif self._running.is_glance:
+            self.worker.cancel()
+            self.busy_changed.emit(self.is_busy)
+
+    def _next(self) -> None:
+        if self._waiting:
+            self._running = self._waiting.popleft()
+        elif self._glance is not None:
+            self._running, self._glance = self._glance, None
+        if self._running is not None:
+            self.worker.start(self._running.title, self._running.work)
+        self.busy_changed.emit(self.is_busy)
+
+    def _take(self, event: Event) -> None:
+        match event:
+            case Started() if self._is_told_of:
+                self.started.emit(event.title)
+            case Progressed() if self._is_told_of:
+                self.progressed.emit(event)
+            case Glimpsed():
+                self.glimpsed.emit(event.part)
+            case Finished() | Failed() | Cancelled():
+                self._end(event)
+
+    def _end(self, event: Finished | Failed | Cancelled) -> None:
+        request, self._running = self._running, None
+        if request is not None and request.is_glance:
+            if isinstance(event, Cancelled) and self._waiting and self._glance is None:
+                self._glance = request  # it made way for work that was asked for
+            _tell_of_glance(request, event)
+        elif request is not None:
+            self.ended.emit()
+            match event:
+                case Finished():
+                    request.done(event.value)
+                case Failed():
+                    self.failed.emit(event.message, event.details)
+                case Cancelled():
+                    self.cancelled.emit(request.title)
+        # What was done may have asked for more.
+        if self._running is None:
+            self._next()
+
+
+def _tell_of_glance(request: _Request, event: Finished | Failed | Cancelled) -> None:
+    if isinstance(event, Finished):
+        request.done(event.value)
+    elif isinstance(event, Failed) and request.failed is not None:
+        request.failed(event.message)

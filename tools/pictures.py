@@ -1,0 +1,116 @@
+"""The pictures of README and user guide: `python -m tools.pictures`, in a display of any kind.
+
+Drives the real window through the demo as a user would, and saves it to docs/images at each
+station of the way, so that the pictures stay true.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PySide6.QtCore import QCoreApplication, QSettings, Qt
+from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QApplication
+
+from pipegui.style import theme
+from pipegui.window.main_window import MainWindow
+from pipegui.window.views import make_parts
+from pipegui.work.job_queue import Jobs
+
+IMAGES = Path(__file__).parents[1] / "docs" / "images"
+SIZE = 1600, 1000
+LOOK_AGAIN, PATIENCE = 0.7, 180.0
+"""Seconds between looks at the window, and until it has to be at rest."""
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Let the window live until something is so."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        if time.monotonic() > end:
+            raise TimeoutError("the window did not get there")
+        QCoreApplication.processEvents()
+        time.sleep(0.01)
+
+
+def linger(seconds: float) -> None:
+    """Let the window live for a while."""
+    end = time.monotonic() + seconds
+    wait_for(lambda: time.monotonic() > end)
+
+
+def picture(window: MainWindow, name: str) -> None:
+    """Save the window once it does not change any more."""
+    last = QImage()
+    end = time.monotonic() + PATIENCE
+    while (now := window.grab().toImage()) != last and time.monotonic() < end:
+        last = now
+        linger(LOOK_AGAIN)
+    path = IMAGES / f"{name}.png"
+    if not now.save(str(path)):
+        raise SystemExit(f"{path} could not be written")
+    print(path.name, flush=True)
+
+
+def walk(window: MainWindow) -> None:
+    """Go through the demo, with a picture at each station."""
+    panels, parts, actions = window.panels, window.parts, window.actions_
+    assert panels.plots is not None
+    picture(window, "guide-welcome")
+
+    actions["demo"].trigger()
+    wait_for(lambda: window.document.scan is not None and not window.jobs.is_busy)
+    picture(window, "guide-opened")
+
+    actions["detect"].trigger()
+    wait_for(lambda: window.document.result is not None and not window.jobs.is_busy)
+    picture(window, "main-window")
+
+    panels.message.hide()
+    panels.plots.setCurrentWidget(parts.map)
+    picture(window, "guide-map")
+
+    panels.plots.setCurrentWidget(parts.section)
+    picture(window, "guide-section")
+
+    panels.plots.setCurrentWidget(parts.radius_plot)
+    actions["show_surfaces"].setChecked(True)
+    actions["fit"].trigger()
+    picture(window, "guide-surfaces")
+    actions["show_surfaces"].setChecked(False)
+
+    actions["next_deformation"].trigger()
+    actions["clip_to_selection"].trigger()
+    picture(window, "guide-clip")
+    actions["clip"].setChecked(False)
+
+    panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
+    actions["fit"].trigger()
+    picture(window, "guide-stacks")
+
+    actions["appearance_dark"].trigger()
+    panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Unchecked)
+    actions["previous_deformation"].trigger()
+    picture(window, "guide-dark")
+
+
+def main() -> None:
+    """Take all pictures."""
+    app = QApplication(sys.argv[:1])
+    theme.apply_theme(app)
+    with TemporaryDirectory() as scratch:
+        stored = QSettings(f"{scratch}/layout.ini", QSettings.Format.IniFormat)
+        window = MainWindow(make_parts(), Jobs(), stored)
+        window.actions_["appearance_light"].trigger()
+        window.resize(*SIZE)
+        window.show()
+        walk(window)
+        window.projects.discard()
+        window.close()
+        window.deleteLater()
+
+
+if __name__ == "__main__":
+    main()
