@@ -43,7 +43,7 @@ class Format:
         ReadError
             From here or from the source's chunks.
         """
-        module = importlib.import_module(f"pipecore.io.{self.module}")
+        module = importlib.import_module(f"pipecore.io.formats.{self.module}")
         open_source: Callable[[Path], AbstractContextManager[Source]] = module.open_source
         return open_source(path)
 
