@@ -118,7 +118,7 @@ def renew(code: str) -> None:
     catalogue.update(extract(), no_fuzzy_matching=True, update_creation_date=False)
     catalogue.obsolete.clear()
     with path_of(code).open("wb") as file:
-        write_po(file, catalogue, width=100, no_location=True, sort_output=False)
+        write_po(file, catalogue, width=100, no_location=True, sort_output=True)
     path_of(code, "mo").write_bytes(compiled(catalogue))
     missing = [m.id for m in catalogue if m.id and not is_translated(m)]
     print(f"{code}: {len(catalogue)} texts, {len(missing)} without a translation")

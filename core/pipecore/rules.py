@@ -155,18 +155,48 @@ def judge(deformation: Deformation, element: Element, rule: Rule) -> Verdict:
     return Verdict.REVIEW
 
 
-def dent_limit(element: Element, rule: Rule) -> float:
-    """Depth in metres above which `rule` rejects a dent on an element; inf if none."""
-    diameter = outside_diameter(element)
-    metres_per = {Measure.DEPTH_MM: 0.001, Measure.DEPTH_PCT_OD: diameter / 100}
-    return min(
-        (
-            criterion.limit * metres_per[criterion.measure]
-            for criterion in rule.criteria
-            if criterion.measure in metres_per and criterion.covers(DeformationKind.DENT, element)
-        ),
-        default=np.inf,
-    )
+@dataclass(frozen=True)
+class DentLimit:
+    """How deep a dent of an element may be, and what says so.
+
+    Parameters
+    ----------
+    depth : float
+        Metres; a deeper dent is rejected.
+    criterion : Criterion
+    rule : Rule
+        The rule that it is of.
+    """
+
+    depth: float
+    criterion: Criterion
+    rule: Rule
+
+
+def dent_limit(element: Element, rule: Rule) -> DentLimit | None:
+    """Return the strictest limit that a rule sets on the depth of an element's dents.
+
+    Parameters
+    ----------
+    element : Element
+    rule : Rule
+
+    Returns
+    -------
+    DentLimit or None
+        None if the rule sets no such limit.
+    """
+    in_metres = {
+        Measure.DEPTH_MM: 1e-3,
+        Measure.DEPTH_PCT_OD: outside_diameter(element) / 100,
+        Measure.DEPTH_PCT_LENGTH: element.axis.length / 100,
+    }
+    limits = [
+        DentLimit(criterion.limit * in_metres[criterion.measure], criterion, rule)
+        for criterion in rule.criteria
+        if criterion.measure in in_metres and criterion.covers(DeformationKind.DENT, element)
+    ]
+    return min(limits, key=lambda limit: limit.depth, default=None)
 
 
 def list_rules() -> tuple[Rule, ...]:

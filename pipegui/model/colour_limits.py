@@ -1,16 +1,15 @@
 """Between which heights or intensities the colours of the points run. Qt-free."""
 
-from functools import lru_cache
-
 import numpy as np
 
 from pipecore.types import PointCloud
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import ColourBy, Limits, ViewOptions
 
 # Ranges are of a whole cloud; kept while it is looked at.
 
 
-@lru_cache(maxsize=4)
+@cached_with_owner(maxsize=4)
 def intensity_range(cloud: PointCloud) -> Limits:
     """Return the intensities between which nearly all points lie."""
     assert cloud.intensity is not None
@@ -19,7 +18,7 @@ def intensity_range(cloud: PointCloud) -> Limits:
     return float(low), float(high)
 
 
-@lru_cache(maxsize=4)
+@cached_with_owner(maxsize=4)
 def height_range(cloud: PointCloud) -> Limits:
     """Return the local heights between which nearly all points lie."""
     sample = cloud.xyz[:: max(1, len(cloud) // 100_000), 2]

@@ -1,56 +1,57 @@
-"""Cuts out of a result: the profiles, points and deformations of one element.
+"""Parts of a result: the profiles, points and deformations of one element.
 
 Made once and kept for the few elements last looked at, because equality of view states
 stands on their identity. Results themselves live in the history. Qt-free.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore import rules
 from pipecore.errors import SettingsError
 from pipecore.geometry import Array, surface_points
-from pipecore.rules import Measure, Rule, load_rule, outside_diameter
+from pipecore.inspection.points import ElementPoints, element_points, profile_points
+from pipecore.rules import DentLimit, Rule, load_rule
 from pipecore.types import (
     OWN_STACK,
     Deformation,
-    DeformationKind,
     PointCloud,
     Profiles,
     Result,
 )
 from pipegui.i18n.texts import tr
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import ProfileKey
 
 
-@lru_cache(maxsize=8)
+@cached_with_owner(maxsize=8)
 def count_profiles(result: Result) -> tuple[int, ...]:
     """Return the number of profiles with an accepted ellipse, per stack."""
     return tuple(int((result.profiles.stack_id == s.stack_id).sum()) for s in result.stacks)
 
 
-@lru_cache(maxsize=8)
+@cached_with_owner(maxsize=8)
 def profile_indices(result: Result, stack_id: int) -> NDArray[np.int32]:
     """Return the profiles of a stack that have an accepted ellipse, in their order."""
     profiles = result.profiles
     return np.unique(profiles.profile_index[profiles.stack_id == stack_id])
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def deformations_of(result: Result, element_id: int) -> tuple[Deformation, ...]:
     """Return the deformations of one element."""
     return result.deformations_of(element_id)
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def profiles_of(result: Result, element_id: int) -> Profiles:
     """Return the profiles of one element, of every stack."""
     return result.profiles.of_element(element_id)
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
     """Return one profile as a table of one row, None if it is not there."""
     rows = profiles_of(result, element_id)
@@ -58,7 +59,7 @@ def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | N
     return rows[np.flatnonzero(row)[:1]] if row.any() else None
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
     """Stacks with profiles of this element: its own first, then by number of profiles."""
     ids, counts = np.unique(profiles_of(result, element_id).stack_id, return_counts=True)
@@ -68,19 +69,11 @@ def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int]
     return tuple(sorted(choices, key=lambda c: (c[0] != OWN_STACK, -c[2], c[0])))
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def plotted_profiles(result: Result, element_id: int) -> Profiles:
     """Profiles of an element's own stack, or of that with most of them."""
     rows, choices = profiles_of(result, element_id), stack_choices(result, element_id)
     return rows[rows.stack_id == choices[0][0]] if choices else rows
-
-
-@dataclass(frozen=True)
-class DentLimit:
-    """How deep a dent may be, metres, and what says so."""
-
-    depth: float
-    text: str
 
 
 @lru_cache(maxsize=4)
@@ -91,23 +84,11 @@ def _rule(name: str) -> Rule | None:
         return None
 
 
-@lru_cache(maxsize=32)
+@cached_with_owner(maxsize=32)
 def dent_limit(result: Result, element_id: int) -> DentLimit | None:
-    """The strictest limit that the result's rule sets on the depth of an element's dents."""
-    rule, element = _rule(result.settings.deformation.rule), result.element(element_id)
-    if rule is None:
-        return None
-    in_metres = {
-        Measure.DEPTH_MM: 1e-3,
-        Measure.DEPTH_PCT_OD: outside_diameter(element) / 100,
-        Measure.DEPTH_PCT_LENGTH: element.axis.length / 100,
-    }
-    limits = [
-        DentLimit(criterion.limit * in_metres[criterion.measure], f"{tr(rule.title)}\n{criterion}")
-        for criterion in rule.criteria
-        if criterion.measure in in_metres and criterion.covers(DeformationKind.DENT, element)
-    ]
-    return min(limits, key=lambda limit: limit.depth, default=None)
+    """Return the strictest limit that the result's rule sets on an element's dents."""
+    rule = _rule(result.settings.deformation.rule)
+    return None if rule is None else rules.dent_limit(result.element(element_id), rule)
 
 
 def stack_name(result: Result, stack_id: int) -> str:
@@ -122,36 +103,19 @@ def stack_name(result: Result, stack_id: int) -> str:
     )
 
 
-@lru_cache(maxsize=4)
-def surface_of(
-    cloud: PointCloud, result: Result, element_id: int
-) -> tuple[Array, Array, Array, NDArray[np.intp]]:
-    """Chainage, clock, deviation and index in the cloud of one element's points."""
-    index = np.flatnonzero(result.element_id == element_id)
-    axis = result.element(element_id).axis
-    chainage, _, clock = axis.pipe_coordinates(cloud.xyz[index].astype(np.float64))
-    return chainage, clock, result.deviation[index].astype(np.float64), index
+@cached_with_owner(maxsize=4)
+def points_of(result: Result, cloud: PointCloud, element_id: int) -> ElementPoints:
+    """Return the points of one element in its pipe coordinates."""
+    return element_points(cloud, result, element_id)
 
 
-@lru_cache(maxsize=8)
-def points_of_profile(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> Array:
-    """Points of the element that lie in one profile, float64."""
+@cached_with_owner(maxsize=8)
+def points_of_profile(result: Result, cloud: PointCloud, element_id: int, key: ProfileKey) -> Array:
+    """Return the points of an element that lie in one profile, shape (n, 3), float64."""
     profile = profile_at(result, element_id, key)
     assert profile is not None
-    chainages, _, _, index = surface_of(cloud, result, element_id)
-    if key.stack_id == OWN_STACK:
-        siblings = profiles_of(result, element_id)
-        siblings = siblings[siblings.stack_id == OWN_STACK]
-        # Neighbouring own profiles touch, so their spacing is their width.
-        width = np.median(np.diff(siblings.chainage)) if len(siblings) > 1 else 0.02
-        inside = np.abs(chainages - profile.chainage[0]) <= width / 2
-        return cloud.xyz[index[inside]].astype(np.float64)
-    stack = next(s for s in result.stacks if s.stack_id == key.stack_id)
-    xyz = cloud.xyz[index]
-    inside = stack.profile_index(xyz) == key.profile_index
-    # A stack's plane may cut a bend twice: only the branch of this profile counts.
-    near = np.abs(chainages - profile.chainage[0]) < 4 * profile.semi_major[0]
-    return xyz[inside & near].astype(np.float64)
+    index = profile_points(cloud, result, profile, points_of(result, cloud, element_id))
+    return cloud.xyz[index].astype(np.float64)
 
 
 def spot_on_surface(result: Result, element_id: int, chainage: float, clock: float) -> Array:

@@ -1,13 +1,13 @@
 """What the user can do to the 3D view, beside the commands on scans and results. Qt-free."""
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 
 from pipecore.geometry import Array, surface_points
 from pipecore.types import Element, PointCloud
 from pipegui.model import result_queries
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.commands import select_parent, select_point, set_view
 from pipegui.model.document import Box, ColourBy, Document, Limits, Measurement, Point, Tool
 
@@ -183,7 +183,7 @@ def set_clip_box(document: Document, box: Box) -> Document:
     return set_view(document, clip_box=Box(_triple(low), _triple(high), is_inverted))
 
 
-@lru_cache(maxsize=2)
+@cached_with_owner(maxsize=2)
 def extent(cloud: PointCloud) -> tuple[Array, Array]:
     """Least and greatest local coordinates of a cloud."""
     columns = cloud.xyz.T

@@ -6,13 +6,12 @@ from PySide6.QtCore import QPointF, QRectF, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QGraphicsEllipseItem, QGraphicsRectItem, QWidget
 
-from pipecore.geometry import Array
+from pipecore.inspection.deviation_grid import DeviationGrid, clock_from, grid_deviation
 from pipecore.report.format import format_clock
 from pipecore.types import Deformation, DeformationKind
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart
 from pipegui.plots.export import Table
-from pipegui.plots.unrolled import Unrolled, from_clock, unroll
 from pipegui.states.view_state import MapState
 from pipegui.style import theme
 from pipegui.style.colour_maps import DEVIATION, deviation_colours
@@ -27,7 +26,7 @@ WHOLE_ROUND = np.deg2rad(330)
 """A deformation wider than this goes all the way round."""
 
 
-class DeviationMap(Chart):
+class DeviationMapView(Chart):
     """Shows the surface of the selected element; clicks say which spot is meant."""
 
     spot_clicked = Signal(float, float)
@@ -38,8 +37,8 @@ class DeviationMap(Chart):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
-        self._state = MapState()
-        self._map: Unrolled | None = None
+        self.state = MapState()
+        self._grid: DeviationGrid | None = None
         self.scale = ScaleStrip()
         self.header.addWidget(self.scale)
         self.header.addStretch(1)
@@ -51,9 +50,9 @@ class DeviationMap(Chart):
         self._image = pg.ImageItem(axisOrder="row-major")
         self._shapes: list[object] = []
         self.plot.addItem(self._image)
-        self._cursor = pg.ScatterPlotItem(size=14, brush=pg.mkBrush(None), antialias=True)
-        self._cursor.setZValue(20)
-        self.plot.addItem(self._cursor, ignoreBounds=True)
+        self.cursor = pg.ScatterPlotItem(size=14, brush=pg.mkBrush(None), antialias=True)
+        self.cursor.setZValue(20)
+        self.plot.addItem(self.cursor, ignoreBounds=True)
         self.on_click(self._click)
         self.on_hover(self._hover)
         self.setAccessibleName(tr("Deviation map"))
@@ -61,11 +60,11 @@ class DeviationMap(Chart):
     def apply(self, state: MapState) -> None:
         """Show `state`."""
         is_new_theme = self.is_new_theme()
-        before, self._state = self._state, state
+        before, self.state = self.state, state
         if state == before and not is_new_theme:
             return
         element = state.element
-        has_points = element is not None and bool(np.isfinite(state.deviation).any())
+        has_points = element is not None and bool(np.isfinite(state.points.deviation).any())
         self.empty.setText(
             tr(EMPTY)
             if element is None
@@ -75,11 +74,11 @@ class DeviationMap(Chart):
         self.scale.set_limit(state.limit_mm)
         self.readout.clear()
         if not has_points:
-            self._map = None
+            self._grid = None
             return
-        is_other = element is not before.element or state.deviation is not before.deviation
+        is_other = element is not before.element or state.points is not before.points
         if is_other:
-            self._map = unroll(element, state.chainage, state.clock, state.deviation)
+            self._grid = grid_deviation(element, state.points)
         self._draw_image()
         self._draw_shapes()
         if is_other:
@@ -88,41 +87,41 @@ class DeviationMap(Chart):
     # Drawing
 
     def _draw_image(self) -> None:
-        values = self._map.deviation_mm.T
-        colours = deviation_colours(values, self._state.limit_mm)
+        values = 1000 * self._grid.deviation.T
+        colours = deviation_colours(values, self.state.limit_mm)
         opaque = np.where(np.isfinite(values), 255, 0).astype(np.uint8)
         self._image.setImage(np.dstack([colours, opaque]), levels=(0, 255))
-        self._image.setRect(QRectF(self._map.start, -180, self._map.length, 360))
+        self._image.setRect(QRectF(self._grid.start, -180, self._grid.length, 360))
 
     def _draw_shapes(self) -> None:
         for shape in self._shapes:
             self.plot.removeItem(shape)
         self._shapes = []
-        for deformation in self._state.deformations:
-            is_selected = deformation.deformation_id == self._state.selected_deformation
+        for deformation in self.state.deformations:
+            is_selected = deformation.deformation_id == self.state.selected_deformation
             colour = theme.colour("accent") if is_selected else QColor(VERDICT[deformation.verdict])
-            for box in self._boxes(deformation):
+            for box in self.boxes(deformation):
                 is_round = box.height() < 360
                 shape = (QGraphicsEllipseItem if is_round else QGraphicsRectItem)(box)
                 pen = QPen(colour, 3.0 if is_selected else 2.0)
                 pen.setCosmetic(True)
                 shape.setPen(pen)
                 self._add(shape)
-        if self._state.selected_chainage is not None:
+        if self.state.selected_chainage is not None:
             line = pg.mkPen(theme.colour("accent"), width=1.5)
-            self._add(pg.InfiniteLine(self._state.selected_chainage, pen=line))
+            self._add(pg.InfiniteLine(self.state.selected_chainage, pen=line))
 
     def _add(self, shape: object) -> None:
         self.plot.addItem(shape, ignoreBounds=True)
         self._shapes.append(shape)
 
-    def _boxes(self, deformation: Deformation) -> list[QRectF]:
+    def boxes(self, deformation: Deformation) -> list[QRectF]:
         """Where a deformation lies on the map; twice if it goes over the cut at 6:00."""
         length = deformation.chainage_end - deformation.chainage_start
         width = float(np.rad2deg(self._angular_width(deformation)))
         if width >= np.rad2deg(WHOLE_ROUND):
             return [QRectF(deformation.chainage_start, -180, length, 360)]
-        middle = float(np.rad2deg(from_clock(deformation.clock)))
+        middle = float(np.rad2deg(clock_from(deformation.clock)))
         turns = [0] + [t for t in (-360, 360) if abs(middle + t) - width / 2 < 180]
         return [
             QRectF(deformation.chainage_start, middle + t - width / 2, length, width) for t in turns
@@ -131,21 +130,23 @@ class DeviationMap(Chart):
     def _angular_width(self, deformation: Deformation) -> float:
         if deformation.kind in {DeformationKind.OVALITY, DeformationKind.BOW}:
             return 2 * np.pi
-        radius = float(self._state.element.radius_at(deformation.chainage))
+        radius = float(self.state.element.radius_at(deformation.chainage))
         width = deformation.width / radius if radius > 0 else np.nan
         return width if np.isfinite(width) else 2 * np.pi
 
     def fit(self) -> None:
         """Show the whole element."""
-        if self._map is not None:
-            self.plot.setXRange(self._map.start, self._map.start + self._map.length, padding=0.02)
+        if self._grid is not None:
+            self.plot.setXRange(
+                self._grid.start, self._grid.start + self._grid.length, padding=0.02
+            )
             self.plot.setYRange(-MARGIN_DEG, MARGIN_DEG, padding=0)
 
     # Copying
 
     def heading(self) -> str:
         """What is unrolled, and what the colours mean."""
-        element, limit = self._state.element, self._state.limit_mm
+        element, limit = self.state.element, self.state.limit_mm
         name = "" if element is None else label_of(element)
         blue, red = (QColor(*DEVIATION[i].tolist()).name() for i in (0, -1))
         inward, outward = (f'<span style="color:{c}">■</span>' for c in (blue, red))
@@ -156,17 +157,16 @@ class DeviationMap(Chart):
 
     def numbers(self) -> Table:
         """The cells that hold points."""
-        if self._map is None:
+        if self._grid is None:
             return {}
-        deviation, counts = self._map.deviation_mm, self._map.n_points
+        deviation_mm, counts = 1000 * self._grid.deviation, self._grid.n_points
         along, around = np.nonzero(counts)
-        chainage = self._map.start + (along + 0.5) * self._map.length / deviation.shape[0]
-        clock = np.mod((around + 0.5) * 2 * np.pi / deviation.shape[1] - np.pi, 2 * np.pi)
+        chainage, clock = self._grid.chainages[along], self._grid.clocks[around]
         return {
             "chainage_m": [f"{v:.4f}" for v in chainage],
             "clock": [format_clock(float(v)) for v in clock],
             "clock_deg": [f"{v:.2f}" for v in np.rad2deg(clock)],
-            "deviation_mm": [f"{v:.3f}" for v in deviation[along, around]],
+            "deviation_mm": [f"{v:.3f}" for v in deviation_mm[along, around]],
             "n_points": [str(v) for v in counts[along, around]],
         }
 
@@ -178,48 +178,46 @@ class DeviationMap(Chart):
         return at.x(), float(np.mod(np.deg2rad(at.y()), 2 * np.pi))
 
     def _click(self, _: pg.PlotItem, position: QPointF) -> None:
-        if self._map is None:
+        if self._grid is None:
             return
         at = self.plot.vb.mapSceneToView(position)
         hit = [
-            d
-            for d in self._state.deformations
-            if any(_is_inside(box, at) for box in self._boxes(d))
+            d for d in self.state.deformations if any(_is_inside(box, at) for box in self.boxes(d))
         ]
         if hit:
             smallest = min(hit, key=lambda d: d.length * self._angular_width(d))
             self.deformation_clicked.emit(smallest.deformation_id)
-        elif self._map.cell(*self._place(position)) is not None:
+        elif self._grid.cell(*self._place(position)) is not None:
             self.spot_clicked.emit(*self._place(position))
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        is_inside = plot is not None and self._map is not None
+        is_inside = plot is not None and self._grid is not None
         self.readout.setText(self._text_at(position) if is_inside else "")
         place = self._place(position) if is_inside else None
-        is_on_it = place is not None and self._map.cell(*place) is not None
+        is_on_it = place is not None and self._grid.cell(*place) is not None
         self.spot_hovered.emit(place if is_on_it else None)
 
     def show_cursor(self, place: tuple[float, float] | None) -> None:
         """Show where another view's cursor is: chainage and clock, or nowhere."""
-        if place is None or self._map is None:
-            self._cursor.clear()
+        if place is None or self._grid is None:
+            self.cursor.clear()
             return
         chainage, clock = place
         pen = pg.mkPen(theme.colour("accent"), width=2)
-        self._cursor.setData([chainage], [float(np.rad2deg(from_clock(clock)))], pen=pen)
+        self.cursor.setData([chainage], [float(np.rad2deg(clock_from(clock)))], pen=pen)
 
     def _text_at(self, position: QPointF) -> str:
         chainage, clock = self._place(position)
-        cell = self._map.cell(chainage, clock)
+        cell = self._grid.cell(chainage, clock)
         if cell is None:
             return ""
         place = f"{chainage:.3f} m · {format_clock(clock)}"
-        n_points = int(self._map.n_points[cell])
+        n_points = int(self._grid.n_points[cell])
         if not n_points:
             return tr("{place} · not scanned").format(place=place)
-        value: Array = self._map.deviation_mm[cell]
+        value = 1000 * float(self._grid.deviation[cell])
         side = tr("outward") if value > 0 else tr("inward")
-        size = format_measure(abs(float(value)), unit="mm")
+        size = format_measure(abs(value), unit="mm")
         return tr("{place} · {size} {side} · {n_points} points").format(
             place=place, size=size, side=side, n_points=n_points
         )

@@ -9,6 +9,7 @@ from PySide6.QtGui import QColor, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
 from pipecore.geometry import Array
+from pipecore.inspection.section import PlaneEllipse
 from pipecore.report.format import cell
 from pipegui.i18n.texts import count, mark, tr
 from pipegui.plots.chart import Chart, faint
@@ -16,7 +17,6 @@ from pipegui.plots.exaggeration import ellipse_points
 from pipegui.plots.export import Table
 from pipegui.plots.section_view import FAR, STEPS
 from pipegui.states.preview_state import PreviewState
-from pipegui.states.section import Ellipse
 from pipegui.style import theme
 from pipegui.style.colour_maps import QUALITATIVE
 
@@ -46,7 +46,7 @@ class PreviewView(Chart):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
-        self._state = PreviewState()
+        self.state = PreviewState()
         self._fitted: object = None
         self.stacks = QComboBox()
         self.stacks.setMinimumContentsLength(10)
@@ -79,7 +79,7 @@ class PreviewView(Chart):
     def apply(self, state: PreviewState) -> None:
         """Show `state`."""
         self.is_new_theme()
-        before, self._state = self._state, state
+        before, self.state = self.state, state
         self.empty.setText(state.message or tr(EMPTY))
         self.show_filled(state.plan is not None and bool(state.plan.stacks))
         if state.plan is None or not state.plan.stacks:
@@ -128,11 +128,11 @@ class PreviewView(Chart):
     def _ellipse(self, preview: "ProfilePreview", row: int) -> Array:
         centre, major, minor, angle = preview.ellipse_uv(row)
         place = float(centre[0]), float(centre[1])
-        return ellipse_points(Ellipse(place, major, minor, angle)) @ upright(preview).T
+        return ellipse_points(PlaneEllipse(place, major, minor, angle)) @ upright(preview).T
 
     def fit(self) -> None:
         """Show all points."""
-        preview = self._state.preview
+        preview = self.state.preview
         if preview is None or not len(preview.uv):
             return
         low, high = np.percentile(preview.uv @ upright(preview).T, [1, 99], axis=0)
@@ -152,7 +152,7 @@ class PreviewView(Chart):
 
     def numbers(self) -> Table:
         """The points with the number of their curve, empty for points of none."""
-        preview = self._state.preview
+        preview = self.state.preview
         if preview is None:
             return {}
         uv = preview.uv @ upright(preview).T
@@ -165,12 +165,12 @@ class PreviewView(Chart):
     # Mouse, keys and sight
 
     def _slide(self, index: int) -> None:
-        self.chosen.emit(self._state.row, index)
+        self.chosen.emit(self.state.row, index)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Step with the arrow keys, far with Page Up and Down, to the ends with Home and End."""
         step = (STEPS | FAR).get(Qt.Key(event.key()))
-        if step is None or self._state.plan is None:
+        if step is None or self.state.plan is None:
             super().keyPressEvent(event)
             return
         self.step_requested.emit(step)
@@ -186,7 +186,7 @@ class PreviewView(Chart):
         self.seen.emit(False)
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        preview = self._state.preview
+        preview = self.state.preview
         if plot is None or preview is None or not len(preview.ellipses):
             self.readout.clear()
             return

@@ -7,13 +7,14 @@ import numpy as np
 from PySide6.QtGui import QColor
 
 from pipecore.geometry import Array
+from pipecore.inspection.radius_pattern import RadiusPattern, radius_pattern
+from pipecore.inspection.section import radius_is_measurable
 from pipecore.report.format import cell
+from pipecore.rules import DentLimit
 from pipecore.types import Element, Profiles
 from pipegui.i18n.texts import format_measure, label_of, tr
-from pipegui.model.result_queries import DentLimit
 from pipegui.plots.chart import faint
 from pipegui.plots.export import Table
-from pipegui.plots.pattern import Pattern
 from pipegui.style import theme
 from pipegui.style.colour_maps import QUALITATIVE
 from pipegui.style.colours import VERDICT
@@ -25,9 +26,21 @@ class Curve:
 
     element: Element
     profiles: Profiles
-    pattern: Pattern
+    pattern_mm: RadiusPattern
+    """In millimetres."""
     x: Array
     colour: QColor
+
+
+def curve_of(element: Element, profiles: Profiles, x: Array, colour: QColor) -> Curve:
+    """Return an element's profiles as they are plotted at places `x`."""
+    pattern_mm = radius_pattern(element, profiles).scaled(1000)
+    return Curve(element, profiles, pattern_mm, x, colour)
+
+
+def free_radius_mm(profiles: Profiles) -> Array:
+    """Return the radii of the free circles, nan where they are not the pipe's, millimetres."""
+    return np.where(radius_is_measurable(profiles), 1000 * profiles.radius, np.nan)
 
 
 def range_of(values: Array, fitted: Array, curve: Curve) -> tuple[float, float] | None:
@@ -37,7 +50,7 @@ def range_of(values: Array, fitted: Array, curve: Curve) -> tuple[float, float] 
         return None
     low, high = np.percentile(values, [2, 98])
     low, high = min(low, fitted.min()), max(high, fitted.max())
-    room = max(0.6 * (high - low), 4 * curve.pattern.spread, 0.5)
+    room = max(0.6 * (high - low), 4 * curve.pattern_mm.scatter, 0.5)
     return float(max(values.min(), low - room)), float(min(values.max(), high + room))
 
 
@@ -49,13 +62,13 @@ def table_of(curves: Sequence[Curve]) -> Table:
         table.setdefault(title, []).extend(cell(float(v), decimals) for v in values)
 
     for curve in curves:
-        rows, pattern = curve.profiles, curve.pattern
+        rows, pattern = curve.profiles, curve.pattern_mm
         table.setdefault("element", []).extend([curve.element.label] * len(rows))
         put("profile_index", rows.profile_index, 0)
         put("chainage_m", rows.chainage, 4)
         put("semi_minor_mm", pattern.values, 3)
         put("semi_minor_sd_mm", pattern.sd, 3)
-        put("radius_mm", 1000 * rows.radius, 3)
+        put("radius_mm", free_radius_mm(rows), 3)
         put("radius_sd_mm", 1000 * rows.radius_sd, 3)
         put("fitted_mm", pattern.fitted, 3)
         put("centre_deviation_mm", 1000 * rows.centre_deviation, 3)
@@ -72,11 +85,16 @@ def key_of(sign: str, colour: QColor, text: str) -> str:
 
 def row_text(profiles: Profiles, row: int) -> str:
     """What is said of the profile under the cursor."""
-    radius = format_measure(1000 * profiles.radius[row], 1000 * profiles.radius_sd[row], "mm")
+    radius = format_measure(free_radius_mm(profiles)[row], 1000 * profiles.radius_sd[row], "mm")
     centre = format_measure(1000 * profiles.centre_deviation[row], unit="mm")
     index, chainage = profiles.profile_index[row], profiles.chainage[row]
     text = tr("Profile {index} · {chainage:.3f} m · radius {radius} · centre off {centre}")
     return text.format(index=index, chainage=chainage, radius=radius, centre=centre)
+
+
+def limit_text(limit: DentLimit) -> str:
+    """Return which rule sets the limit for dents, and by which criterion."""
+    return f"{tr(limit.rule.title)}\n{limit.criterion}"
 
 
 def legend(
@@ -86,8 +104,8 @@ def legend(
     limit: DentLimit | None,
 ) -> str:
     """What the lines and points of the plot are, as rich text."""
-    pattern, data = curve.pattern, curve.colour
-    spread = format_measure(pattern.spread, unit="mm", decimals=2)
+    pattern, data = curve.pattern_mm, curve.colour
+    spread = format_measure(pattern.scatter, unit="mm", decimals=2)
     scatter = tr("scatter ± {spread}").format(spread=spread)
     if np.ptp(pattern.fitted) < 1e-6:  # else it is not one number
         middle = format_measure(pattern.middle, decimals=2)

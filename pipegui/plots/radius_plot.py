@@ -16,14 +16,23 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.geometry import Array
+from pipecore.inspection.radius_pattern import profile_index_at
 from pipecore.types import Element, Profiles
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.model.document import ProfileKey
 from pipegui.plots import drawing
 from pipegui.plots.chart import Chart, small
 from pipegui.plots.export import Table
-from pipegui.plots.pattern import index_at, pattern_of
-from pipegui.plots.radius_curves import Curve, legend, range_of, row_text, table_of
+from pipegui.plots.radius_curves import (
+    Curve,
+    curve_of,
+    free_radius_mm,
+    legend,
+    limit_text,
+    range_of,
+    row_text,
+    table_of,
+)
 from pipegui.plots.series_menu import SeriesMenu
 from pipegui.states.view_state import RadiusPlotState
 from pipegui.style import theme
@@ -68,7 +77,7 @@ class RadiusPlot(Chart):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
-        self._state = RadiusPlotState()
+        self.state = RadiusPlotState()
         self._curve: Curve | None = None
         self._pinned: list[Curve] = []
         self._had_room = True
@@ -130,7 +139,7 @@ class RadiusPlot(Chart):
     def apply(self, state: RadiusPlotState) -> None:
         """Show `state`."""
         is_new_theme = self.is_new_theme()
-        before, self._state = self._state, state
+        before, self.state = self.state, state
         if state == before and not is_new_theme:
             return
         has_profiles = state.element is not None and len(state.shown) > 0
@@ -188,21 +197,21 @@ class RadiusPlot(Chart):
     def _x_at(self, chainage: Array | float, profiles: Profiles) -> Array:
         if self._is_by_chainage:
             return np.asarray(chainage, np.float64)
-        return np.asarray(index_at(chainage, profiles), np.float64)
+        return profile_index_at(chainage, profiles)
 
     def _curve_of(self, element: Element, profiles: Profiles, number: int) -> Curve:
         x = self._x_at(profiles.chainage, profiles)
         colour = QColor(*QUALITATIVE[number % len(QUALITATIVE)].tolist())
-        return Curve(element, profiles, pattern_of(element, profiles), x, colour)
+        return curve_of(element, profiles, x, colour)
 
     def _level(self, curve: Curve, values: Array) -> Array:
         """Values of a curve as plotted: as they are, or less the fitted radius."""
-        return values - curve.pattern.fitted if self.shows("difference") else values
+        return values - curve.pattern_mm.fitted if self.shows("difference") else values
 
     # Drawing
 
     def _draw(self) -> None:
-        state, profiles = self._state, self._state.shown
+        state, profiles = self.state, self.state.shown
         self.readout.clear()
         for plot in self.plots():
             plot.clear()
@@ -220,14 +229,14 @@ class RadiusPlot(Chart):
             drawing.draw_band(
                 self.radius,
                 curve.x,
-                self._level(curve, curve.pattern.moved),
-                curve.pattern.spread,
+                self._level(curve, curve.pattern_mm.moved),
+                curve.pattern_mm.scatter,
                 curve.colour,
             )
-            moved = self._level(curve, curve.pattern.moved)
+            moved = self._level(curve, curve.pattern_mm.moved)
             drawing.draw_line(self.radius, curve.x, moved, curve.colour, dashed=True)
         if self.shows("limit") and state.dent_limit is not None:
-            lowest = curve.pattern.fitted - 1000 * state.dent_limit.depth
+            lowest = curve.pattern_mm.fitted - 1000 * state.dent_limit.depth
             red = QColor(VERDICT["reject"])
             drawing.draw_line(self.radius, curve.x, self._level(curve, lowest), red, dashed=True)
         for one in (*self._pinned, curve):
@@ -271,14 +280,14 @@ class RadiusPlot(Chart):
             title.setBrush(theme.colour("muted"))
 
     def _draw_curve(self, curve: Curve, *, is_pinned: bool) -> None:
-        profiles, pattern, bars = curve.profiles, curve.pattern, self.shows("error_bars")
+        profiles, pattern, bars = curve.profiles, curve.pattern_mm, self.shows("error_bars")
         size = drawing.POINT_PX - (1.5 if is_pinned else 0)
         if self.shows("fitted"):
             colour = curve.colour if is_pinned else theme.colour("text")
             fitted = self._level(curve, pattern.fitted)
             drawing.draw_line(self.radius, curve.x, fitted, colour)
         if self.shows("free_radius") and not is_pinned:
-            free, sd = 1000 * profiles.radius, 1000 * profiles.radius_sd
+            free, sd = free_radius_mm(profiles), 1000 * profiles.radius_sd
             violet = QColor(*QUALITATIVE[-1].tolist())
             level = self._level(curve, free)
             drawing.draw_points(self.radius, curve.x, level, violet, sd if bars else None, "d", 7)
@@ -292,8 +301,8 @@ class RadiusPlot(Chart):
             drawing.draw_points(plot, curve.x, values, curve.colour, size=size)
 
     def _shade_deformations(self, curve: Curve) -> None:
-        for deformation in self._state.deformations:
-            is_selected = deformation.deformation_id == self._state.selected_deformation
+        for deformation in self.state.deformations:
+            is_selected = deformation.deformation_id == self.state.selected_deformation
             colour = theme.colour("accent") if is_selected else QColor(VERDICT[deformation.verdict])
             ends = np.array([deformation.chainage_start, deformation.chainage_end])
             ends = self._x_at(ends, curve.profiles)
@@ -304,7 +313,7 @@ class RadiusPlot(Chart):
             drawing.draw_label(self.radius, float(ends.mean()), text, colour, font)
 
     def _mark_selected(self, curve: Curve) -> None:
-        index = self._state.selected_index
+        index = self.state.selected_index
         rows = np.flatnonzero(curve.profiles.profile_index == index) if index is not None else []
         if not len(rows):
             return
@@ -314,15 +323,15 @@ class RadiusPlot(Chart):
     def _values(self, plot: pg.PlotItem, curve: Curve) -> Array:
         """The points that a plot shows of a curve."""
         if plot is self.radius:
-            return self._level(curve, curve.pattern.values)
+            return self._level(curve, curve.pattern_mm.values)
         if plot is self.offset:
             return 1000 * curve.profiles.centre_deviation
         return 100 * curve.profiles.ovality
 
     def _describe(self, curve: Curve) -> None:
-        limit = self._state.dent_limit
+        limit = self.state.dent_limit
         self.key.setText(legend(curve, self._pinned, self.shows, limit))
-        self.key.setToolTip(limit.text if limit is not None and self.shows("limit") else "")
+        self.key.setToolTip(limit_text(limit) if limit and self.shows("limit") else "")
 
     def fit(self) -> None:
         """Show all points with a margin; a few wild ones must not flatten the rest."""
@@ -331,16 +340,18 @@ class RadiusPlot(Chart):
             return
         ranges = [
             range_of(
-                self._level(one, one.pattern.values), self._level(one, one.pattern.fitted), one
+                self._level(one, one.pattern_mm.values),
+                self._level(one, one.pattern_mm.fitted),
+                one,
             )
             for one in (curve, *self._pinned)
         ]
         lows, highs = ([r[end] for r in ranges if r is not None] for end in (0, 1))
         if not lows:
             return
-        if self.shows("limit") and self._state.dent_limit is not None:
-            limit = self._level(curve, curve.pattern.fitted).min()
-            limit -= 1000 * self._state.dent_limit.depth
+        if self.shows("limit") and self.state.dent_limit is not None:
+            limit = self._level(curve, curve.pattern_mm.fitted).min()
+            limit -= 1000 * self.state.dent_limit.depth
             if limit > min(lows) - (max(highs) - min(lows)):  # else it would flatten the rest
                 lows.append(limit)
         margin = max(0.15 * (max(highs) - min(lows)), 0.5)
@@ -356,7 +367,7 @@ class RadiusPlot(Chart):
 
     def heading(self) -> str:
         """Title and key of the picture."""
-        element = self._state.element
+        element = self.state.element
         name = "" if element is None else label_of(element)
         return f"<b>{name}</b> · {self.stacks.currentText()}<br>{self.key.text()}"
 
@@ -387,11 +398,11 @@ class RadiusPlot(Chart):
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
         row = self._row_at(plot, position) if plot is not None else None
-        text = "" if row is None else row_text(self._state.shown, row)
+        text = "" if row is None else row_text(self.state.shown, row)
         metrics, elide = QFontMetrics(self.readout.font()), Qt.TextElideMode.ElideRight
         self.readout.setText(metrics.elidedText(text, elide, self.readout.width()))
         self.profile_hovered.emit(None if row is None else self._key_of(row))
 
     def _key_of(self, row: int) -> ProfileKey:
-        profiles = self._state.shown
+        profiles = self.state.shown
         return ProfileKey(int(profiles.stack_id[row]), int(profiles.profile_index[row]))

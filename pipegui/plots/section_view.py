@@ -10,15 +10,16 @@ from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
 from pipecore.geometry import Array
+from pipecore.inspection.dimensions import measure_dimensions
+from pipecore.inspection.section import PlaneEllipse, Section
 from pipecore.report.format import cell
 from pipecore.types import OWN_STACK
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart, faint
-from pipegui.plots.dimensions import clock_of, curve_points, dimensions, dimensions_text
-from pipegui.plots.exaggeration import deviations, ellipse_points, exaggerate
+from pipegui.plots.exaggeration import ellipse_points, exaggerate
 from pipegui.plots.export import Table
+from pipegui.plots.section_texts import dimension_text, section_text, value_text
 from pipegui.plots.series_menu import SeriesMenu
-from pipegui.states.section import Ellipse, SectionCut
 from pipegui.states.view_state import SectionState
 from pipegui.style import theme
 from pipegui.style.colour_maps import QUALITATIVE
@@ -27,6 +28,8 @@ EMPTY = mark("Select a profile to see its section: click a point of the radius p
 MAX_FACTOR = 20
 MAX_POINTS = 20_000
 HOVER_PX = 15
+MM = 1000.0
+"""Sections come in metres and are drawn in millimetres."""
 ROOM_FOR_BOTH = 250
 """Height in pixels below which the section stands alone."""
 CLOCK = (("12", 0, 1), ("3", 1, 0), ("6", 0, -1), ("9", -1, 0))
@@ -57,7 +60,7 @@ class SectionView(Chart):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
-        self._state = SectionState()
+        self.state = SectionState()
         self._make_header()
         self.plot = self.add_plot(0, "mm")
         self.plot.setAspectLocked(True)
@@ -101,11 +104,11 @@ class SectionView(Chart):
 
     def apply(self, state: SectionState) -> None:
         """Show `state`."""
-        if not self.is_new_theme() and state == self._state:
+        if not self.is_new_theme() and state == self.state:
             return
-        before, self._state = self._state, state
+        before, self.state = self.state, state
         self.show_filled(state.profile is not None)
-        if state.profile is None or state.cut is None:
+        if state.profile is None or state.section is None:
             for plot in self.plots():
                 plot.clear()
             return
@@ -120,7 +123,7 @@ class SectionView(Chart):
         )
         self.back.setEnabled(state.position > 1)
         self.ahead.setEnabled(state.position < state.count)
-        self.dimensions.setText(dimensions_text(state.profile, state.cut))
+        self.dimensions.setText(section_text(state.section))
         self._draw()
         if state.element is not before.element or before.profile is None:
             self.fit()
@@ -151,27 +154,28 @@ class SectionView(Chart):
     # Drawing
 
     def _draw(self) -> None:
-        cut, factor = self._state.cut, self.factor.value()
+        section, factor = self.state.section, self.factor.value()
         self.factor_text.setText(f"{factor}×")
         for plot in self.plots():
             plot.clear()
         self.readout.clear()
-        if cut is None:
+        if section is None:
             return
-        muted, reference = theme.colour("muted"), cut.reference
+        muted, reference = theme.colour("muted"), section.reference
         if self._shows("reference"):
             dashed = pg.mkPen(muted, width=1.5, style=Qt.PenStyle.DashLine)
-            self.plot.plot(*ellipse_points(reference).T, pen=dashed, antialias=True)
-        if self._shows("nominal") and cut.nominal is not None:
+            self.plot.plot(*(MM * ellipse_points(reference)).T, pen=dashed, antialias=True)
+        if self._shows("nominal") and section.nominal is not None:
             dotted = pg.mkPen(theme.colour("text"), width=1.2, style=Qt.PenStyle.DotLine)
-            self._draw_contour(cut.nominal, dotted, factor)
+            self._draw_contour(section.nominal, dotted, factor)
         self._draw_clock(reference)
-        is_drawable = factor == 1 or _is_around(cut.fitted, reference)
-        if self._shows("ellipse") and is_drawable and not cut.is_askew:
-            self._draw_contour(cut.fitted, pg.mkPen(faint(_points_colour(), 0.9), width=1), factor)
+        is_drawable = factor == 1 or _is_around(section.fitted, reference)
+        if self._shows("ellipse") and is_drawable and section.is_radius_measurable:
+            pen = pg.mkPen(faint(_points_colour(), 0.9), width=1)
+            self._draw_contour(section.fitted, pen, factor)
         if self._shows("points"):
-            points = cut.points_uv[:: max(1, -(-len(cut.points_uv) // MAX_POINTS))]
-            drawn = exaggerate(points, reference, factor)
+            points = section.points_uv[:: max(1, -(-len(section.points_uv) // MAX_POINTS))]
+            drawn = MM * exaggerate(points, reference, factor)
             self.plot.addItem(
                 pg.ScatterPlotItem(
                     *drawn.T,
@@ -183,23 +187,23 @@ class SectionView(Chart):
             )
         if self._shows("curve"):
             pen = pg.mkPen(theme.colour("accent"), width=2)
-            for piece in curve_points(cut):
-                curve = exaggerate(piece, reference, factor)
+            for piece in section.curve_pieces():
+                curve = MM * exaggerate(piece, reference, factor)
                 self.plot.plot(*curve.T, pen=pen, antialias=True)
         if self._shows("dimensions"):
-            self._draw_dimensions(cut, factor)
-        self._draw_curvature(cut)
+            self._draw_dimensions(section, factor)
+        self._draw_curvature(section)
 
-    def _draw_contour(self, ellipse: Ellipse, pen: object, factor: int) -> None:
-        assert self._state.cut is not None
+    def _draw_contour(self, ellipse: PlaneEllipse, pen: object, factor: int) -> None:
+        assert self.state.section is not None
         shown = ellipse_points(ellipse)
         if np.isfinite(shown).all():
-            drawn = exaggerate(shown, self._state.cut.reference, factor)
+            drawn = MM * exaggerate(shown, self.state.section.reference, factor)
             self.plot.plot(*drawn.T, pen=pen, antialias=True)
 
-    def _draw_clock(self, reference: Ellipse) -> None:
-        u, v = reference.centre_uv
-        radius = reference.semi_major_mm
+    def _draw_clock(self, reference: PlaneEllipse) -> None:
+        u, v = MM * np.asarray(reference.centre_uv)
+        radius = MM * reference.semi_major
         muted = theme.colour("muted")
         for text, right, up in CLOCK:
             ends = np.array([[u, v]]) + np.outer((0.94, 1.06), (right, up)) * radius
@@ -210,28 +214,28 @@ class SectionView(Chart):
         cross = pg.ScatterPlotItem([u], [v], symbol="+", size=11, pen=muted, brush=muted)
         self.plot.addItem(cross)
 
-    def _draw_dimensions(self, cut: SectionCut, factor: int) -> None:
+    def _draw_dimensions(self, section: Section, factor: int) -> None:
         text_colour = theme.colour("text")
-        for number, dimension in enumerate(dimensions(cut)):
-            ends = exaggerate(dimension.ends_uv, cut.reference, factor)
-            is_depth = dimension.name in ("Depth", "Height")
+        for number, dimension in enumerate(measure_dimensions(section)):
+            ends = exaggerate(dimension.ends_uv, section.reference, factor)
+            is_depth = not dimension.is_diameter
             pen = pg.mkPen(text_colour, width=2 if is_depth else 1)
-            self.plot.plot(*ends.T, pen=pen, symbol="+", symbolSize=7, symbolPen=pen)
+            self.plot.plot(*(MM * ends).T, pen=pen, symbol="+", symbolSize=7, symbolPen=pen)
             if not is_depth and self.canvas.height() < ROOM_FOR_BOTH:
                 continue  # they would lie on each other; the line below the plot has them
             # Labels of crossing diameters stand off the centre, towards different ends.
             share = 0.0 if is_depth else 0.28 + 0.44 * (number % 2)
-            anchor = _outward_anchor(ends[0], cut.reference) if is_depth else (0.5, 0.5)
-            text = dimension.value if is_depth else dimension.text
+            anchor = _outward_anchor(ends[0], section.reference) if is_depth else (0.5, 0.5)
+            text = value_text(dimension) if is_depth else dimension_text(dimension)
             label = pg.TextItem(text, color=text_colour, anchor=anchor)
             label.fill = pg.mkBrush(faint(theme.colour("window"), 0.75))
-            label.setPos(*(ends[0] + share * (ends[1] - ends[0])))
+            label.setPos(*(MM * (ends[0] + share * (ends[1] - ends[0]))))
             self.plot.addItem(label)
 
     def _give_room(self) -> bool:
         """Show the curvature where it is wanted and leaves room for the section."""
-        cut = self._state.cut
-        is_wanted = self._shows("curvature") and cut is not None and cut.curve is not None
+        section = self.state.section
+        is_wanted = self._shows("curvature") and section is not None and section.curve is not None
         is_shown = is_wanted and self.canvas.height() >= ROOM_FOR_BOTH
         # What is merely hidden keeps its room.
         layout = self.canvas.ci
@@ -249,20 +253,20 @@ class SectionView(Chart):
 
     def _refit(self) -> None:
         """Leave the curvature out of a small panel."""
-        if self._state.cut is not None and self._has_curvature() != self._give_room():
+        if self.state.section is not None and self._has_curvature() != self._give_room():
             self._redraw()
 
-    def _draw_curvature(self, cut: SectionCut) -> None:
+    def _draw_curvature(self, section: Section) -> None:
         """Curvature times radius against the clock: 1 on a circle."""
-        if not self._give_room() or cut.curve is None:
+        if not self._give_room() or section.curve is None:
             return
         round_line = pg.mkPen(theme.colour("muted"), width=1.5, style=Qt.PenStyle.DashLine)
         self.curvature.addItem(pg.InfiniteLine(1.0, angle=0, pen=round_line))
-        radius, accent = cut.reference.semi_minor_mm / 1000, theme.colour("accent")
+        radius, accent = section.reference.semi_minor, theme.colour("accent")
         lowest, highest = 0.5, 1.5
-        for clocks in cut.curve.clocks():
-            value = radius * cut.curve.curvature_at(clocks)
-            sd = radius * cut.curve.curvature_sd_at(clocks)
+        for clocks in section.curve.clocks():
+            value = radius * section.curve.curvature_at(clocks)
+            sd = radius * section.curve.curvature_sd_at(clocks)
             degrees = np.rad2deg(clocks)
             turns = (0, -360) if degrees[-1] > 360 else (0,)
             for turn in turns:
@@ -283,13 +287,14 @@ class SectionView(Chart):
 
     def fit(self) -> None:
         """Show the whole section."""
-        cut = self._state.cut
-        if cut is not None:
-            (u, v), reach = cut.reference.centre_uv, 1.35 * cut.reference.semi_major_mm
-            if len(cut.points_uv):
-                drawn = exaggerate(cut.points_uv, cut.reference, self.factor.value())
-                away = np.linalg.norm(drawn - cut.reference.centre_uv, axis=1)
-                reach = max(reach, 1.05 * float(np.percentile(away, 99)))
+        section = self.state.section
+        if section is not None:
+            reference = section.reference
+            (u, v), reach = MM * np.asarray(reference.centre_uv), 1.35 * MM * reference.semi_major
+            if len(section.points_uv):
+                drawn = exaggerate(section.points_uv, reference, self.factor.value())
+                away = np.linalg.norm(drawn - reference.centre_uv, axis=1)
+                reach = max(reach, 1.05 * MM * float(np.percentile(away, 99)))
             self.plot.setRange(xRange=(u - reach, u + reach), yRange=(v - reach, v + reach))
             self.curvature.setXRange(0, 360, padding=0.05)
 
@@ -297,27 +302,27 @@ class SectionView(Chart):
 
     def heading(self) -> str:
         """What section it is, and its dimensions."""
-        element = self._state.element
+        element = self.state.element
         name = "" if element is None else label_of(element)
         return f"<b>{name}</b> · {self.title.text()}<br>{self.dimensions.text()}"
 
     def numbers(self) -> Table:
         """The points, with their distance from the undeformed contour and the curve there."""
-        cut = self._state.cut
-        if cut is None:
+        section = self.state.section
+        if section is None:
             return {}
-        points, reference = cut.points_uv, cut.reference
-        clocks = np.array([clock_of(p, reference) for p in points])
+        points, reference = section.points_uv, section.reference
+        clocks = reference.clock(points)
         curve, curvature = np.full(len(points), np.nan), np.full(len(points), np.nan)
-        if cut.curve is not None:
-            curve = 1000 * cut.curve.radius_at(clocks)
-            curvature = cut.curve.curvature_at(clocks)
-        relative = points - np.asarray(reference.centre_uv)
+        if section.curve is not None:
+            curve = MM * section.curve.radius_at(clocks)
+            curvature = section.curve.curvature_at(clocks)
+        relative = MM * (points - np.asarray(reference.centre_uv))
         columns: dict[str, tuple[Array, int]] = {
             "right_mm": (relative[:, 0], 3),
             "up_mm": (relative[:, 1], 3),
             "clock_deg": (np.rad2deg(clocks), 2),
-            "deviation_mm": (deviations(points, reference), 3),
+            "deviation_mm": (MM * reference.deviation(points), 3),
             "curve_radius_mm": (curve, 3),
             "curvature_per_m": (curvature, 3),
         }
@@ -332,7 +337,7 @@ class SectionView(Chart):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Step with the arrow keys, far with Page Up and Down, to the ends with Home and End."""
         step = (STEPS | FAR).get(Qt.Key(event.key()))
-        if step is None or self._state.profile is None or event.modifiers() & _MODIFIERS:
+        if step is None or self.state.profile is None or event.modifiers() & _MODIFIERS:
             super().keyPressEvent(event)
             return
         self.step_requested.emit(step)
@@ -343,27 +348,26 @@ class SectionView(Chart):
         self.spot_hovered.emit(None if point is None else self._spot_of(point))
 
     def _point_at(self, position: QPointF) -> Array | None:
-        """Millimetres in the plane of the point that is drawn near `position`, shape (1, 2)."""
-        cut = self._state.cut
-        if cut is None or not len(cut.points_uv):
+        """Place in the plane of the point that is drawn near `position`, shape (1, 2), metres."""
+        section = self.state.section
+        if section is None or not len(section.points_uv):
             return None
         at = self.plot.vb.mapSceneToView(position)
-        drawn = exaggerate(cut.points_uv, cut.reference, self.factor.value())
+        drawn = MM * exaggerate(section.points_uv, section.reference, self.factor.value())
         away = np.hypot(*(drawn - (at.x(), at.y())).T) / self.plot.vb.viewPixelSize()[0]
         nearest = int(np.argmin(away))
-        return None if away[nearest] > HOVER_PX else cut.points_uv[nearest : nearest + 1]
+        return None if away[nearest] > HOVER_PX else section.points_uv[nearest : nearest + 1]
 
     def _spot_of(self, point: Array) -> tuple[float, float] | None:
         """Where on the element that is, if the section is square to its axis."""
-        profile, cut = self._state.profile, self._state.cut
-        if profile is None or cut is None or int(profile.stack_id[0]) != OWN_STACK:
+        profile, section = self.state.profile, self.state.section
+        if profile is None or section is None or int(profile.stack_id[0]) != OWN_STACK:
             return None
-        u, v = (point[0] - cut.reference.centre_uv).tolist()
-        return float(profile.chainage[0]), float(np.mod(np.arctan2(u, v), 2 * np.pi))
+        return float(profile.chainage[0]), float(section.reference.clock(point)[0])
 
     def _text_of(self, point: Array) -> str:
-        assert self._state.cut is not None
-        value = float(deviations(point, self._state.cut.reference)[0])
+        assert self.state.section is not None
+        value = MM * float(self.state.section.reference.deviation(point)[0])
         side = tr("outward") if value > 0 else tr("inward")
         return tr("{value} {side} of the undeformed contour").format(
             value=format_measure(abs(value), unit="mm"), side=side
@@ -377,13 +381,13 @@ def _points_colour() -> QColor:
     return QColor(*QUALITATIVE[0].tolist())
 
 
-def _is_around(ellipse: Ellipse, reference: Ellipse) -> bool:
+def _is_around(ellipse: PlaneEllipse, reference: PlaneEllipse) -> bool:
     """Whether the reference's centre lies well inside an ellipse: else it has no rays to it."""
     offset = np.subtract(ellipse.centre_uv, reference.centre_uv)
-    return bool(np.linalg.norm(offset) < 0.5 * ellipse.semi_minor_mm)
+    return bool(np.linalg.norm(offset) < 0.5 * ellipse.semi_minor)
 
 
-def _outward_anchor(place: Array, reference: Ellipse) -> tuple[float, float]:
+def _outward_anchor(place: Array, reference: PlaneEllipse) -> tuple[float, float]:
     """Where a label has its anchor so that it stands outside of a place on the contour."""
     u, v = place - np.asarray(reference.centre_uv)
     reach = max(abs(u), abs(v), 1e-9)

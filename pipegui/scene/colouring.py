@@ -1,13 +1,13 @@
 """What colour each point has. Qt- and VTK-free."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.colour_limits import height_limits, intensity_limits
 from pipegui.model.document import Box, ColourBy, ViewOptions
 from pipegui.scene.neighbours import colour_apart, neighbouring_ids
@@ -123,8 +123,8 @@ def _share(values: NDArray[np.floating], limits: tuple[float, float]) -> NDArray
     return (values - low) / max(high - low, 1e-12)
 
 
-@lru_cache(maxsize=4)
-def _apart(cloud: PointCloud, result: Result, colour_by: ColourBy) -> NDArray[np.intp]:
+@cached_with_owner(maxsize=2)
+def _apart(result: Result, cloud: PointCloud, colour_by: ColourBy) -> NDArray[np.intp]:
     """Index into `QUALITATIVE` for each id."""
     ids = _ids(result, colour_by)
     pairs = neighbouring_ids(cloud.xyz, ids)
@@ -168,7 +168,7 @@ def _by_kind(asked: _Asked) -> Colours:
 
 
 def _by_id(asked: _Asked) -> Colours:
-    table = QUALITATIVE[_apart(asked.cloud, asked.result, asked.view.colour_by)]
+    table = QUALITATIVE[_apart(asked.result, asked.cloud, asked.view.colour_by)]
     table[NO_ID] = asked.muted
     return table[_ids(asked.result, asked.view.colour_by)[asked.rows]]
 
@@ -217,7 +217,7 @@ def profile_rows(cloud: PointCloud, stack: Stack, profile_index: int) -> NDArray
 
 def profile_colours(cloud: PointCloud, result: Result, rows: NDArray[np.intp]) -> Colours:
     """Return the colours of a profile's points, each as its element, grey where there is none."""
-    table = QUALITATIVE[_apart(cloud, result, ColourBy.ELEMENT)]
+    table = QUALITATIVE[_apart(result, cloud, ColourBy.ELEMENT)]
     table[NO_ID] = NO_ELEMENT
     return table[result.element_id[rows]]
 

@@ -5,7 +5,6 @@ Only what is drawn is copied, so that a cloud of any size costs no more than is 
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from vtkmodules.vtkCommonDataModel import vtkPlane, vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkRenderer
 
 from pipecore.types import Floats, PointCloud
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import Box
 from pipegui.scene.spreading import Spread
 from pipegui.style.colour_maps import Colours
@@ -254,7 +254,7 @@ def set_planes(actor: vtkActor, box: Box | None) -> None:
         planes.GetItem(i).SetOrigin(box.low if i < 3 else box.high)
 
 
-@lru_cache(maxsize=4)
+@cached_with_owner(maxsize=1)
 def _spacing_of(cloud: PointCloud) -> float:
     """Three layers show the same cloud."""
     return estimate_spacing(cloud.xyz)

@@ -4,11 +4,11 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from pipecore.geometry import ArcAxis, Array
+from pipecore.inspection.section import radius_is_measurable
 from pipecore.report.format import (
     NOT_MEASURABLE,
     cell,
@@ -32,6 +32,7 @@ from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.model.document import Scan, Selection
 from pipegui.model.result_queries import stack_name
+from pipegui.model.view_commands import extent
 from pipegui.states.view_state import PropertiesState
 
 OVALITY = "(Dmax − Dmin) / Dnom"
@@ -194,18 +195,13 @@ def properties(state: PropertiesState) -> list[Property | Heading]:
     return [*lines, Heading(label_of(element)), *_of_element(element, result)]
 
 
-@lru_cache(maxsize=4)
-def _extent(cloud: PointCloud) -> tuple[Array, Array]:
-    return cloud.xyz.min(axis=0), cloud.xyz.max(axis=0)
-
-
 def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
     cloud = scan.cloud
     yield Heading(scan.name)
     yield Property(tr("Points"), f"{len(cloud):,}", str(len(cloud)))
-    low, high = _extent(cloud)
-    extent = " × ".join(f"{v:.2f}" for v in high - low)
-    yield Property(tr("Extent"), f"{extent} m", " ".join(f"{v:.3f}" for v in high - low))
+    low, high = extent(cloud)
+    edges = " × ".join(f"{v:.2f}" for v in high - low)
+    yield Property(tr("Extent"), f"{edges} m", " ".join(f"{v:.3f}" for v in high - low))
     middle = cloud.world((low + high) / 2)
     for name, value in zip("XYZ", middle, strict=True):
         yield Property(
@@ -359,7 +355,13 @@ def _of_profile(profile: Profiles, result: Result) -> Iterator[Property]:
     name = stack_name(result, int(row["stack_id"]))
     yield Property(tr("Stack"), name, name)
     yield _measure(tr("Chainage"), row["chainage"], unit="m")
-    yield _measure(tr("Radius"), row["radius"], row["radius_sd"])
+    is_measurable = radius_is_measurable(profile)[0]
+    yield _measure(
+        tr("Radius"),
+        row["radius"] if is_measurable else math.nan,
+        row["radius_sd"],
+        hint="" if is_measurable else tr("Little is seen of this profile, and that is deformed."),
+    )
     yield _measure(tr("Semi-minor axis"), row["semi_minor"])
     yield _measure(tr("Semi-major axis"), row["semi_major"])
     too_short = tr(ARC_TOO_SHORT).format(arc=math.degrees(row["arc"]))

@@ -8,12 +8,14 @@ Nothing here knows Qt or VTK.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.inspection.points import ElementPoints
+from pipecore.inspection.section import Section, cut_section
+from pipecore.rules import DentLimit
 from pipecore.settings import ProfileSettings, Settings, StackSettings
 from pipecore.types import (
     NO_ID,
@@ -28,6 +30,7 @@ from pipecore.types import (
 )
 from pipegui.model import colour_limits, result_queries
 from pipegui.model import selection as selecting
+from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import (
     Box,
     ColourBy,
@@ -40,14 +43,13 @@ from pipegui.model.document import (
     ViewOptions,
 )
 from pipegui.states.preview_state import PlanningState
-from pipegui.states.section import SectionCut, cut_section
 
 Array = NDArray[np.float64]
 
 NO_PROFILES = Profiles.empty()
-NOTHING = np.empty(0)
 NO_INDICES = np.empty(0, np.int32)
 NO_POINTS = np.empty((0, 3))
+NO_ELEMENT_POINTS = ElementPoints(np.empty(0, np.intp), *np.empty((4, 0)))
 
 
 class _ComparedByParts:
@@ -124,7 +126,7 @@ class RadiusPlotState(_ComparedByParts):
     selected_deformation: int = NO_ID
     pinned: tuple[Pinned, ...] = ()
     is_pinned: bool = False
-    dent_limit: result_queries.DentLimit | None = None
+    dent_limit: DentLimit | None = None
 
     @property
     def shown(self) -> Profiles:
@@ -141,8 +143,8 @@ class SectionState(_ComparedByParts):
     element : Element, optional
     profile : Profiles, optional
         A table of one row, or None if no profile is selected.
-    cut : SectionCut, optional
-        Its points and contours in its plane.
+    section : Section, optional
+        The profile in its own plane.
     position, count : int
         This is profile `position` (from 1) of `count` in its stack.
     stack_name : str
@@ -152,7 +154,7 @@ class SectionState(_ComparedByParts):
 
     element: Element | None = None
     profile: Profiles | None = None
-    cut: SectionCut | None = None
+    section: Section | None = None
     position: int = 0
     count: int = 0
     stack_name: str = ""
@@ -161,16 +163,10 @@ class SectionState(_ComparedByParts):
 
 @dataclass(frozen=True, eq=False)
 class MapState(_ComparedByParts):
-    """The unrolled deviation map of the selected element.
-
-    `chainage` (metres), `clock` (radians, 0 … 2π) and `deviation` (metres, outward
-    positive) belong to the element's points, shape (n,).
-    """
+    """The unrolled deviation map of the selected element, and its points."""
 
     element: Element | None = None
-    chainage: Array = field(default_factory=lambda: NOTHING)
-    clock: Array = field(default_factory=lambda: NOTHING)
-    deviation: Array = field(default_factory=lambda: NOTHING)
+    points: ElementPoints = NO_ELEMENT_POINTS
     deformations: tuple[Deformation, ...] = ()
     selected_deformation: int = NO_ID
     selected_chainage: float | None = None
@@ -275,11 +271,11 @@ def resolve(document: Document) -> ViewState:
     scan, result = document.scan, document.result
     selection, view = document.selection, document.view
     profile, profile_xyz, shown = None, NO_POINTS, None
-    if result is not None:
+    if scan is not None and result is not None:
         if selection.profile is not None:
             profile = result_queries.profile_at(result, selection.element_id, selection.profile)
             if profile is not None:
-                args = scan.cloud, result, selection.element_id, selection.profile
+                args = result, scan.cloud, selection.element_id, selection.profile
                 profile_xyz = result_queries.points_of_profile(*args)
         shown = selecting.shown_profile(result, selection)
     return ViewState(
@@ -359,15 +355,10 @@ def _element_states(
     if profile is None or shown is None:
         section = SectionState(element=element)
     else:
-        section = _section(scan.cloud, result, element.element_id, shown)
-    chainage, clock, deviation, _ = result_queries.surface_of(
-        scan.cloud, result, element.element_id
-    )
+        section = _section(result, scan.cloud, element.element_id, shown)
     deviation_map = MapState(
         element=element,
-        chainage=chainage,
-        clock=clock,
-        deviation=deviation,
+        points=result_queries.points_of(result, scan.cloud, element.element_id),
         deformations=deformations,
         selected_deformation=selection.deformation_id,
         selected_chainage=None if profile is None else float(profile.chainage[0]),
@@ -376,19 +367,19 @@ def _element_states(
     return {"radius_plot": radius_plot, "section": section, "map": deviation_map}
 
 
-@lru_cache(maxsize=8)
-def _section(cloud: PointCloud, result: Result, element_id: int, key: ProfileKey) -> SectionState:
+@cached_with_owner(maxsize=8)
+def _section(result: Result, cloud: PointCloud, element_id: int, key: ProfileKey) -> SectionState:
     """The section of a profile of the element."""
     profile = result_queries.profile_at(result, element_id, key)
     assert profile is not None
     element, chainage = result.element(element_id), float(profile.chainage[0])
-    xyz = result_queries.points_of_profile(cloud, result, element_id, key)
+    xyz = result_queries.points_of_profile(result, cloud, element_id, key)
     siblings = result_queries.profiles_of(result, element_id)
     siblings = siblings[siblings.stack_id == key.stack_id]
     return SectionState(
         element=element,
         profile=profile,
-        cut=cut_section(element, profile, xyz),
+        section=cut_section(element, profile, xyz),
         position=1 + int(np.flatnonzero(siblings.profile_index == key.profile_index)[0]),
         count=len(siblings),
         stack_name=result_queries.stack_name(result, key.stack_id),

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from pipegui.plots.deviation_map import DeviationMap
+    from pipegui.plots.deviation_map import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView
@@ -21,16 +21,16 @@ class Parts:
     scene: "SceneView"
     radius_plot: "RadiusPlot"
     section: "SectionView"
-    map: "DeviationMap"
+    map: "DeviationMapView"
     preview: "PreviewView"
 
 
 def make_parts() -> Parts:
     """Make the real views. Imported here, because VTK takes its time."""
-    from pipegui.plots.deviation_map import DeviationMap  # noqa: PLC0415
+    from pipegui.plots.deviation_map import DeviationMapView  # noqa: PLC0415
     from pipegui.plots.preview_view import PreviewView  # noqa: PLC0415
     from pipegui.plots.radius_plot import RadiusPlot  # noqa: PLC0415
     from pipegui.plots.section_view import SectionView  # noqa: PLC0415
     from pipegui.scene.view import SceneView  # noqa: PLC0415
 
-    return Parts(SceneView(), RadiusPlot(), SectionView(), DeviationMap(), PreviewView())
+    return Parts(SceneView(), RadiusPlot(), SectionView(), DeviationMapView(), PreviewView())

@@ -7,7 +7,16 @@ import pytest
 from pipecore.errors import SettingsError
 from pipecore.pipeline import judge_deformations
 from pipecore.report import write_report
-from pipecore.rules import Measure, judge, list_rules, load_rule
+from pipecore.rules import (
+    Criterion,
+    Measure,
+    Rule,
+    dent_limit,
+    judge,
+    list_rules,
+    load_rule,
+    outside_diameter,
+)
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, ElementKind, NominalSize, Verdict
 from tests.factories import make_result, make_scan
@@ -198,3 +207,39 @@ def test_that_every_rule_that_comes_with_the_program_is_told_in_the_documentatio
         assert f"`{rule.name}`" in page
     for measure in Measure:
         assert f"`{measure}`" in page
+
+
+DENTS = (DeformationKind.DENT,)
+
+
+def rule_of(*criteria: Criterion) -> Rule:
+    return Rule("own", "Own", "test", "", criteria)
+
+
+@pytest.mark.parametrize("measure", [m for m in Measure if m.startswith("depth")])
+def test_that_a_dent_is_rejected_just_beyond_the_limit_that_is_told(measure):
+    """Whatever the limit refers to: the limit that is drawn is the one that judges."""
+    element, rule = pipe(168.3), rule_of(Criterion(DENTS, measure, 2.0))
+    limit = dent_limit(element, rule)
+    for factor, expected in ((1.001, Verdict.REJECT), (0.999, Verdict.ACCEPT)):
+        deformation = dent(1000 * factor * limit.depth, sd_mm=1e-6)
+        assert judge(deformation, element, rule) is expected
+
+
+def test_that_the_strictest_limit_for_dents_counts():
+    element = pipe(168.3)
+    loose, strict = (
+        Criterion(DENTS, Measure.DEPTH_PCT_OD, 6.0),
+        Criterion(DENTS, Measure.DEPTH_MM, 5),
+    )
+    limit = dent_limit(element, rule_of(loose, strict))
+    assert limit.criterion is strict
+    assert limit.depth == pytest.approx(0.005)
+    assert dent_limit(element, rule_of(loose)).depth == 0.06 * outside_diameter(element)
+
+
+def test_that_a_rule_about_something_else_sets_no_limit_for_dents():
+    element = pipe(168.3)
+    bow = Criterion((DeformationKind.BOW,), Measure.DEPTH_PCT_LENGTH, 0.2)
+    assert dent_limit(element, rule_of(bow)) is None
+    assert dent_limit(element, rule_of(Criterion(DENTS, Measure.OVALITY_PCT, 3.0))) is None

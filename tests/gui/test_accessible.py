@@ -55,7 +55,7 @@ def named(widget):
 @pytest.fixture
 def whole(make_window, qtbot):
     """A window with the real plots beside a fake 3D view."""
-    from pipegui.plots.deviation_map import DeviationMap
+    from pipegui.plots.deviation_map import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView
@@ -63,7 +63,7 @@ def whole(make_window, qtbot):
 
     parts = make_fake_parts()
     parts.radius_plot, parts.section = RadiusPlot(), SectionView()
-    parts.map, parts.preview = DeviationMap(), PreviewView()
+    parts.map, parts.preview = DeviationMapView(), PreviewView()
     window = make_window(parts=parts)
     window.do(commands.open_scan, Scan("plant.laz", CLOUD))
     window.take_result(CLOUD, RESULT)

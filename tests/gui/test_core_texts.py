@@ -13,8 +13,8 @@ from pipecore.settings import Settings
 from pipecore.types import ElementKind
 from pipegui.i18n import texts
 from pipegui.i18n.reason_texts import REASONS, _pattern, reason_text
-from tests import catalogue
 from tests.factories import make_scan
+from tools import translations as catalogue
 
 ERRORS = (
     lambda folder: read(folder / "none.laz"),

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QTabWidget
 
 from pipegui.controllers.remembered_choices import keep, keep_tab
 from pipegui.panels.deformation_table import DeformationTable
-from pipegui.plots.deviation_map import DeviationMap
+from pipegui.plots.deviation_map import DeviationMapView
 from pipegui.plots.preview_view import PreviewView
 from pipegui.plots.radius_plot import AT_FIRST, RadiusPlot
 from pipegui.plots.section_view import SectionView
@@ -34,7 +34,7 @@ def start_again(make_window, qtbot):
             old.projects.discard()
             old.close()
             old.stored.sync()
-        parts = Parts(FakeScene(), RadiusPlot(), SectionView(), DeviationMap(), PreviewView())
+        parts = Parts(FakeScene(), RadiusPlot(), SectionView(), DeviationMapView(), PreviewView())
         windows.append(make_window(parts=parts))
         windows[0].open_files([Path("plant.laz")])
         qtbot.waitUntil(lambda: windows[0].document.scan is not None)

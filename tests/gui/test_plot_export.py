@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 
 from pipegui.model.document import ProfileKey, Selection
 from pipegui.plots.chart import SAVED_AS
-from pipegui.plots.deviation_map import DeviationMap
+from pipegui.plots.deviation_map import DeviationMapView
 from pipegui.plots.export import to_csv, to_tsv
 from pipegui.plots.radius_plot import RadiusPlot
 from pipegui.plots.section_view import SectionView
@@ -21,7 +21,7 @@ CTRL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModi
 PLOTS = {
     "radius_plot": (RadiusPlot, Selection(1, 2)),
     "section": (SectionView, Selection(1, 2, 0, ProfileKey(0, 20))),
-    "map": (DeviationMap, Selection(1, 2)),
+    "map": (DeviationMapView, Selection(1, 2)),
 }
 
 
@@ -81,7 +81,7 @@ def test_that_the_drawing_is_made_of_lines_and_letters(plot, qtbot):
     root = ET.fromstring(plot.as_file("svg"))
     tags = [element.tag.rsplit("}")[-1] for element in root.iter()]
     assert tags.count("text") > 5
-    if not isinstance(plot, DeviationMap):  # whose cells are a picture
+    if not isinstance(plot, DeviationMapView):  # whose cells are a picture
         assert tags.count("path") + tags.count("polyline") > 50
         assert "image" not in tags
 
@@ -100,7 +100,7 @@ def test_that_the_section_numbers_put_the_points_where_they_are(qtbot):
     state = states(Selection(1, 2, 0, key)).section
     plot = shown(qtbot, SectionView(), state)
     rows = rows_of(plot.as_file("csv").decode(), ",")
-    assert len(rows) == len(state.cut.points_uv)
+    assert len(rows) == len(state.section.points_uv)
     right, up, clock, off, curve = (
         np.array([float(r[name] or "nan") for r in rows])
         for name in ("right_mm", "up_mm", "clock_deg", "deviation_mm", "curve_radius_mm")
@@ -112,7 +112,7 @@ def test_that_the_section_numbers_put_the_points_where_they_are(qtbot):
 
 
 def test_that_the_map_numbers_leave_out_what_was_not_scanned(qtbot):
-    plot = shown(qtbot, DeviationMap(), states(Selection(1, 2)).map)
+    plot = shown(qtbot, DeviationMapView(), states(Selection(1, 2)).map)
     rows = rows_of(plot.as_file("csv").decode(), ",")
     assert sum(int(r["n_points"]) for r in rows) == (RESULT.element_id == 2).sum()
     deepest = min(rows, key=lambda r: float(r["deviation_mm"]))

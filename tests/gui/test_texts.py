@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 from pipegui.i18n import texts
 from pipegui.model import commands, view_commands
 from pipegui.model.document import Scan
-from tests import catalogue
 from tests.factories import make_scan
+from tools import translations as catalogue
 
 TRANSLATED = [code for code in texts.LANGUAGES if code not in ("", "en")]
 
@@ -171,7 +171,7 @@ def test_that_the_empty_window_is_german_too(make_window):
 
 @pytest.mark.usefixtures("german")
 def test_that_nothing_english_is_left_in_the_german_window(make_window):
-    from pipegui.plots.deviation_map import DeviationMap
+    from pipegui.plots.deviation_map import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView
@@ -179,7 +179,7 @@ def test_that_nothing_english_is_left_in_the_german_window(make_window):
 
     parts = make_fake_parts()
     parts.radius_plot, parts.section = RadiusPlot(), SectionView()
-    parts.map, parts.preview = DeviationMap(), PreviewView()
+    parts.map, parts.preview = DeviationMapView(), PreviewView()
     window = make_window(parts=parts)
     cloud, result = make_scan()
     result = replace(result)  # What was told of a result is kept; of this one nothing was told.

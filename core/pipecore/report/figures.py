@@ -13,6 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pipecore.inspection.deviation_grid import clock_from, grid_deviation
+from pipecore.inspection.points import ElementPoints, element_points
+from pipecore.inspection.radius_pattern import radius_pattern
 from pipecore.report.format import format_clock
 from pipecore.types import (
     OWN_STACK,
@@ -47,12 +50,7 @@ STYLE: dict[Any, Any] = {
 RIGHT = (0.57, 0.19, 0.35, 0.70)
 COLOUR_BAR = (0.93, 0.19, 0.012, 0.70)
 
-FINEST_CELLS_AROUND = 60
-POINTS_PER_CELL = 6
 SECTION_CELLS = 72
-
-Points = tuple[Array, Array, Array, Array]
-"""Chainage, clock, deviation, and height over the fitted radius of an element's points."""
 
 
 def draw_deformation(
@@ -63,7 +61,7 @@ def draw_deformation(
     `rows` are those of the cloud's points that are the element's.
     """
     element = result.element(deformation.element_id)
-    points = _points_of(element, cloud, result, rows)
+    points = element_points(cloud, result, element.element_id, rows)
     with mpl.rc_context(STYLE):
         # Places by hand: a layout engine takes as long as all the drawing.
         figure = Figure(figsize=(7.4, 2.3))
@@ -91,18 +89,19 @@ def _mark_extent(axes: Axes, deformation: Deformation) -> None:
 
 def _draw_radius(axes: Axes, deformation: Deformation, element: Element, result: Result) -> None:
     profiles = result.profiles.of_element(element.element_id, OWN_STACK)
+    pattern = radius_pattern(element, profiles)
     _mark_extent(axes, deformation)
     chainage = np.linspace(0, element.axis.length, 50)
     axes.plot(chainage, 1000 * element.radius_at(chainage), color=GREY, lw=1.0, label="fitted")
     axes.plot(
-        *broken_at_gaps(profiles.chainage, 1000 * profiles.semi_minor),
+        *broken_at_gaps(profiles.chainage, 1000 * pattern.values),
         color=BLUE,
         lw=0.8,
     )
     axes.errorbar(
         profiles.chainage,
-        1000 * profiles.semi_minor,
-        yerr=1000 * np.nan_to_num(profiles.semi_minor_sd),
+        1000 * pattern.values,
+        yerr=1000 * np.nan_to_num(pattern.sd),
         fmt=".",
         ms=2.5,
         color=INK,
@@ -128,37 +127,19 @@ def _drawn_depth(deformation: Deformation) -> float:
     return max(deformation.depth, 0.001) if np.isfinite(deformation.depth) else 0.01
 
 
-def _points_of(
-    element: Element, cloud: PointCloud, result: Result, rows: NDArray[np.intp]
-) -> Points:
-    chainage, rho, clock = element.axis.pipe_coordinates(np.asarray(cloud.xyz[rows], np.float64))
-    deviation = np.asarray(result.deviation[rows], np.float64)
-    return chainage, clock, deviation, rho - element.radius_at(chainage)
-
-
-def _draw_map(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
-    chainage, clock, deviation, _ = points
+def _draw_map(
+    axes: Axes, deformation: Deformation, element: Element, points: ElementPoints
+) -> None:
     reach = (deformation.chainage_end - deformation.chainage_start) / 2 + 2 * element.radius
     low = max(0.0, deformation.chainage - reach)
     high = min(element.axis.length, deformation.chainage + reach)
     # The deformation stands in the middle of the map, wherever it is on the clock.
     middle = deformation.clock if np.isfinite(deformation.clock) else np.pi
-    around = np.mod(clock - middle + np.pi, 2 * np.pi) - np.pi
-    valid = np.isfinite(deviation) & (chainage >= low) & (chainage <= high)
-    n_around = _cells_around(int(valid.sum()), high - low, element)
-    cell = 2 * np.pi * element.radius / n_around
-    where: dict[str, Any] = {
-        "bins": [max(1, round((high - low) / cell)), n_around],
-        "range": [[low, high], [-np.pi, np.pi]],
-    }
-    count = np.histogram2d(chainage[valid], around[valid], **where)[0]
-    total = np.histogram2d(chainage[valid], around[valid], weights=deviation[valid], **where)[0]
-    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
-
+    grid = grid_deviation(element, points, extent=(low, high), centre_clock=middle)
     limit = float(np.ceil(1000 * _drawn_depth(deformation)))
     axes.set_facecolor("#eeeeee")  # holes stay holes
     image = axes.imshow(
-        1000 * mean.T,
+        1000 * grid.deviation.T,
         extent=(low, high, np.pi, -np.pi),
         aspect="auto",
         cmap="RdBu_r",
@@ -173,21 +154,15 @@ def _draw_map(axes: Axes, deformation: Deformation, element: Element, points: Po
     figure.colorbar(image, cax=figure.add_axes(COLOUR_BAR), ticks=[-limit, 0, limit])
 
 
-def _cells_around(n_points: int, length: float, element: Element) -> int:
-    """Number of square cells around the pipe that leaves some points in each that is seen."""
-    seen_area = length * element.radius * max(element.arc, 0.1)
-    cell = np.sqrt(POINTS_PER_CELL * seen_area / max(n_points, 1))
-    return int(np.clip(2 * np.pi * element.radius / cell, 12, FINEST_CELLS_AROUND))
-
-
 def _set_clock_ticks(axes: Axes, middle: float) -> None:
     hours = np.arange(0, 2 * np.pi, np.pi / 2)
-    ticks = np.mod(hours - middle + np.pi, 2 * np.pi) - np.pi
-    axes.set_yticks(ticks, [format_clock(hour) for hour in hours])
+    axes.set_yticks(clock_from(hours, middle), [format_clock(hour) for hour in hours])
 
 
-def _draw_section(axes: Axes, deformation: Deformation, element: Element, points: Points) -> None:
-    angle, mean = section_around(deformation, points)
+def _draw_section(
+    axes: Axes, deformation: Deformation, element: Element, points: ElementPoints
+) -> None:
+    angle, mean = section_around(deformation, element, points)
     radius = float(element.radius_at(deformation.chainage))
     # So exaggerated that the deviation is a fifth of the radius, by a round factor.
     exaggeration = max(1, round(radius / 5 / _drawn_depth(deformation)))
@@ -210,15 +185,18 @@ def _draw_section(axes: Axes, deformation: Deformation, element: Element, points
     )
 
 
-def section_around(deformation: Deformation, points: Points) -> tuple[Array, Array]:
+def section_around(
+    deformation: Deformation, element: Element, points: ElementPoints
+) -> tuple[Array, Array]:
     """Clock and mean height over the fitted radius of the points around an ovality's peak.
 
     Not their deviations: those are from the section's own curve, which is oval itself.
     """
-    chainage, clock, deviation, height = points
     half = max(0.02, (deformation.chainage_end - deformation.chainage_start) / 6)
-    near = (np.abs(chainage - deformation.chainage) < half) & np.isfinite(deviation)
-    return _means_around(clock[near], height[near])
+    is_near = np.abs(points.chainage - deformation.chainage) < half
+    is_near &= np.isfinite(points.deviation)
+    height = points.distance - element.radius_at(points.chainage)
+    return _means_around(points.clock[is_near], height[is_near])
 
 
 def _means_around(clock: Array, height: Array) -> tuple[Array, Array]:

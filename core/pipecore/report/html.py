@@ -324,7 +324,8 @@ def _where(d: Deformation, place: FileCoordinates) -> list[str]:
 def _blind_spot(result: Result, rule: Rule) -> str:
     """Say where the rule asks for more than was looked for."""
     smallest = result.settings.deformation.min_depth_mm / 1000
-    small = [e for e in result.elements if dent_limit(e, rule) < smallest]
+    limits = [(e, dent_limit(e, rule)) for e in result.elements]
+    small = [e for e, limit in limits if limit is not None and limit.depth < smallest]
     if not small:
         return ""
     return (

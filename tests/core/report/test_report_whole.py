@@ -13,6 +13,7 @@ import pytest
 import pipecore.report
 import pipecore.report.html
 from pipecore.errors import CancelledError, SettingsError, WriteError
+from pipecore.inspection.points import ElementPoints
 from pipecore.report import by_verdict, result_to_dict, summarise, write_html, write_report
 from pipecore.report.figures import broken_at_gaps, section_around
 from pipecore.settings import Settings
@@ -306,11 +307,15 @@ def test_that_a_line_is_not_drawn_where_profiles_are_missing():
 
 def test_that_the_section_of_an_oval_pipe_is_oval(rng):
     """Though its points deviate by nothing from the section's own curve."""
-    ovality = make_scan()[1].deformations[0]
+    result = make_scan()[1]
+    ovality = result.deformations[0]
+    element = result.element(ovality.element_id)
     chainage = ovality.chainage + rng.uniform(-0.005, 0.005, 20_000)
     clock = rng.uniform(0, 2 * np.pi, 20_000)
     height = 0.005 * np.cos(2 * clock)
-    angle, mean = section_around(ovality, (chainage, clock, 0 * clock, height))
+    distance = element.radius_at(chainage) + height
+    points = ElementPoints(np.arange(20_000), chainage, distance, clock, 0 * clock)
+    angle, mean = section_around(ovality, element, points)
     assert mean == pytest.approx(0.005 * np.cos(2 * angle), abs=3e-4)
 
 
