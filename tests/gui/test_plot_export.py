@@ -107,7 +107,7 @@ def test_that_the_section_numbers_put_the_points_where_they_are(qtbot):
     )
     radius = np.hypot(right, up)
     assert np.mod(np.rad2deg(np.arctan2(right, up)), 360) == pytest.approx(clock, abs=0.02)
-    assert radius - state.cut.reference.semi_minor_mm == pytest.approx(off, abs=0.01)
+    assert radius - 1000 * state.section.reference.semi_minor == pytest.approx(off, abs=0.01)
     assert np.nanstd(radius - curve) < np.std(off) + 0.1
 
 
