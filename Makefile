@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui study bench pictures texts format lock venv system-packages clean
+.PHONY: help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -39,6 +39,11 @@ test-kernels: venv
 
 test-gui: venv
 	$(WINDOWED) $(PYTHON) -m pytest tests/gui
+
+# Tests that draw at random have one fixed seed in `make test`.
+HOURS ?= 1
+explore: venv ## Repeat the tests that draw at random with new seeds for HOURS, and report failure rates
+	$(PYTHON) -m tools.explore --hours $(HOURS)
 
 study: venv ## Measure the accuracy on simulated scans (half an hour; writes docs/accuracy.md)
 	@# A peer to compare with, of no use to anything else here.

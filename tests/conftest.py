@@ -1,8 +1,6 @@
 """Fixtures that all tests share: seeds that can be repeated, and the folder of real scans."""
 
 import hashlib
-import os
-import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,41 +8,41 @@ import hypothesis
 import numpy as np
 import pytest
 
-SEED_VARIABLE = "PIPEGUI_TEST_SEED"
-SESSION_SEED = pytest.StashKey[int]()
+from tests.seeds import SEED_VARIABLE, given_seed, without_seed
+
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 
 # The first call of a kernel compiles it, which takes longer than any deadline.
-hypothesis.settings.register_profile("pipegui", deadline=None, print_blob=True)
-hypothesis.settings.load_profile("pipegui")
+hypothesis.settings.register_profile("fixed", deadline=None, print_blob=True, derandomize=True)
+hypothesis.settings.register_profile("explore", deadline=None, print_blob=True)
+hypothesis.settings.load_profile("fixed")
 
 
-def pytest_configure(config: pytest.Config) -> None:
-    given = os.environ.get(SEED_VARIABLE)
-    config.stash[SESSION_SEED] = secrets.randbelow(2**32) if given is None else int(given)
-
-
-def pytest_report_header(config: pytest.Config) -> str:
-    return f"seed: {config.stash[SESSION_SEED]} (repeat with {_how_to_repeat(config)})"
+def pytest_report_header() -> str:
+    return f"seed: {given_seed()} (another by {SEED_VARIABLE}; `make explore` draws new ones)"
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
     report = yield
-    if report.failed and "seed" in getattr(item, "fixturenames", ()):
-        report.sections.append(("Seed", f"Repeat with {_how_to_repeat(item.config)}"))
+    if report.failed and "session_seed" in getattr(item, "fixturenames", ()):
+        seed = item.funcargs.get("session_seed", given_seed())
+        report.sections.append(("Seed", f"Repeat with {SEED_VARIABLE}={seed}"))
     return report
 
 
-def _how_to_repeat(config: pytest.Config) -> str:
-    return f"{SEED_VARIABLE}={config.stash[SESSION_SEED]}"
+@pytest.fixture(scope="session")
+def session_seed() -> int:
+    """The seed that the head of the session's report prints."""
+    return given_seed()
 
 
 @pytest.fixture
-def seed(request: pytest.FixtureRequest) -> int:
-    """A seed of this test alone: new in each session, the same whatever runs beside it."""
-    text = f"{request.config.stash[SESSION_SEED]} {request.node.nodeid}"
-    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little")
+def seed(session_seed: int, request: pytest.FixtureRequest) -> int:
+    """A seed of this test alone, the same in whatever file and beside whatever else it runs."""
+    text = f"{session_seed} {without_seed(request.node.name)}"
+    digest = hashlib.sha256(text.encode()).digest()
+    return int.from_bytes(digest[:8], "little")
 
 
 @pytest.fixture

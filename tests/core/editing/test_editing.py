@@ -14,7 +14,6 @@ from pipecore.settings import Settings
 from pipecore.simulate import Scan, Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Dent, Elbow, Run, Straight
 from pipecore.types import NO_ID, OWN_STACK, DeformationKind, ElementKind, Result
-from tests.conftest import SESSION_SEED
 
 RADIUS, THIN = 0.084, 0.057
 DEPTH = 0.012
@@ -47,8 +46,8 @@ def plant(seed: int) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def simulated(request) -> Scan:
-    return scan(plant(request.config.stash[SESSION_SEED]))
+def simulated(session_seed) -> Scan:
+    return scan(plant(session_seed))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,6 @@ from pipecore.simulate import Scan, Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Elbow, Reducer, Run, Straight
 from pipecore.simulate.scoring import score
 from pipecore.types import NO_ID, ElementKind, PointCloud, Result
-from tests.conftest import SESSION_SEED
 from tests.core.shapes import cloud_of, plane, random_rotation, tube
 
 ORIGIN = (432_100.0, 6_201_870.0, 110.0)
@@ -50,12 +49,6 @@ def plant(seed: int) -> Scene:
         ORIGIN,
         seed=seed,
     )
-
-
-@pytest.fixture(scope="module")
-def session_seed(request) -> int:
-    """The seed that the head of the session's report prints."""
-    return request.config.stash[SESSION_SEED]
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,6 @@ from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Elbow, Run, Straight
 from pipecore.tiling import detect_in_tiles, thinning
 from pipecore.types import PointCloud
-from tests.conftest import SESSION_SEED
 
 TILES = {"tiling.memory_gib": 0.5, "tiling.tile_mpoints": 0.01}
 CSVS = ("elements.csv", "profiles.csv", "deformations.csv")
@@ -44,10 +43,10 @@ def plant(seed: int) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def scanned(request, tmp_path_factory):
+def scanned(session_seed, tmp_path_factory):
     """A simulated plant as a file."""
     path = tmp_path_factory.mktemp("scan") / "plant.laz"
-    io.write_laz(path, scan(plant(request.config.stash[SESSION_SEED])).cloud)
+    io.write_laz(path, scan(plant(session_seed)).cloud)
     return path
 
 
