@@ -14,14 +14,14 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
 from pipecore.editing import STAGES as EDITING_STAGES
+from pipecore.formatting import NOT_MEASURABLE
 from pipecore.io import file_filter
 from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
-from pipecore.report.format import NOT_MEASURABLE
 from pipecore.resources import resource
 from pipecore.rules import list_rules
 from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
-from pipecore.types import SPOKEN_KIND, DeformationKind, ElementKind, ReviewState, Verdict
+from pipecore.types import KIND_LABELS, DeformationKind, ElementKind, ReviewState, Verdict
 from pipegui.i18n.texts import DOMAIN, LANGUAGES
 from pipegui.model.document import Background, ColourBy
 from pipegui.model.presets import Presets
@@ -68,7 +68,7 @@ def tables() -> Iterator[str]:
         yield from (str(value) for value in enum)
     for enum in (ElementKind, DeformationKind, Verdict, ReviewState):
         yield from (str(value) for value in enum)
-    yield from SPOKEN_KIND.values()
+    yield from KIND_LABELS.values()
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():

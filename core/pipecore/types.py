@@ -172,7 +172,7 @@ class Element:
     @property
     def label(self) -> str:
         """What people call it: its own name, else such as "Pipe 3" or "Bend 4"."""
-        return self.name or f"{SPOKEN_KIND[self.kind]} {self.element_id}"
+        return self.name or f"{KIND_LABELS[self.kind]} {self.element_id}"
 
     def radius_at(self, chainage: Array | float) -> Array:
         """Radius of the fitted surface about the axis at `chainage`, metres."""
@@ -184,7 +184,7 @@ class Element:
         return np.asarray(self.radius + slope * s)
 
 
-SPOKEN_KIND = {
+KIND_LABELS = {
     ElementKind.CYLINDER: "Pipe",
     ElementKind.CONE: "Reducer",
     ElementKind.SPHERE: "Sphere",
@@ -193,7 +193,7 @@ SPOKEN_KIND = {
     ElementKind.TEE: "Tee",
     ElementKind.OTHER: "Element",
 }
-"""What an element of a kind is called that has no name of its own."""
+"""Label of an element of a kind that has no name of its own, such as "Pipe"."""
 
 
 OWN_STACK = 0

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from pipecore.errors import PipecoreError
-from pipecore.report.format import NOT_MEASURABLE
-from pipecore.report.format import format_measure as _format_measure
+from pipecore.formatting import NOT_MEASURABLE
+from pipecore.formatting import format_measure as _format_measure
 from pipecore.resources import resource
 from pipecore.types import Element, Result
 

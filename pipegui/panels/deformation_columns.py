@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
-from pipecore.geometry import Array
-from pipecore.report.format import (
+from pipecore.formatting import (
     cell,
     format_clock,
     format_coordinate,
 )
+from pipecore.geometry import Array
 from pipecore.report.summary import VERDICT_ORDER
 from pipecore.rules import outside_diameter
 from pipecore.types import Deformation, Element, Result, Review, ReviewState

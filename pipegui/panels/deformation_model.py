@@ -15,7 +15,7 @@ from PySide6.QtCore import (
     Signal,
 )
 
-from pipecore.report.format import NOT_MEASURABLE
+from pipecore.formatting import NOT_MEASURABLE
 from pipecore.report.summary import by_verdict
 from pipecore.types import Deformation, DeformationKind, Result, Review, ReviewState, Verdict
 from pipegui.i18n.texts import tr

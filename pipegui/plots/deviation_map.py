@@ -6,8 +6,8 @@ from PySide6.QtCore import QPointF, QRectF, Signal
 from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen
 from PySide6.QtWidgets import QGraphicsEllipseItem, QGraphicsRectItem, QWidget
 
+from pipecore.formatting import format_clock
 from pipecore.inspection.deviation_grid import DeviationGrid, clock_from, grid_deviation
-from pipecore.report.format import format_clock
 from pipecore.types import Deformation, DeformationKind
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart

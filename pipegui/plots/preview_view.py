@@ -8,9 +8,9 @@ from PySide6.QtCore import QPointF, QSignalBlocker, Qt, Signal
 from PySide6.QtGui import QColor, QHideEvent, QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
+from pipecore.formatting import cell
 from pipecore.geometry import Array
 from pipecore.inspection.section import PlaneEllipse
-from pipecore.report.format import cell
 from pipegui.i18n.texts import count, mark, tr
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.exaggeration import ellipse_points

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from PySide6.QtGui import QColor
 
+from pipecore.formatting import cell
 from pipecore.geometry import Array
 from pipecore.inspection.radius_pattern import RadiusPattern, radius_pattern
 from pipecore.inspection.section import radius_is_measurable
-from pipecore.report.format import cell
 from pipecore.rules import DentLimit
 from pipecore.types import Element, Profiles
 from pipegui.i18n.texts import format_measure, label_of, tr

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from pipecore.formatting import format_clock
 from pipecore.inspection.dimensions import Dimension, DimensionKind, measure_dimensions
 from pipecore.inspection.section import Section
-from pipecore.report.format import format_clock
 from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import format_measure, mark, tr
 

@@ -9,10 +9,10 @@ from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 
+from pipecore.formatting import cell
 from pipecore.geometry import Array
 from pipecore.inspection.dimensions import measure_dimensions
 from pipecore.inspection.section import PlaneEllipse, Section
-from pipecore.report.format import cell
 from pipecore.types import OWN_STACK
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart, faint

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.report.format import MINUS
+from pipecore.formatting import MINUS
 from pipecore.types import ElementKind, PointCloud, Result
 from pipegui.i18n.texts import first_capital, mark, tr
 from pipegui.model.colour_limits import height_limits, intensity_limits, n_decimals

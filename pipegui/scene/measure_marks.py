@@ -6,7 +6,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
-from pipecore.report.format import MINUS
+from pipecore.formatting import MINUS
 from pipecore.types import PointCloud
 from pipegui.i18n.texts import tr
 from pipegui.model.document import Measurement

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.geometry import ArcAxis, Array
-from pipecore.inspection.section import radius_is_measurable
-from pipecore.report.format import (
+from pipecore.formatting import (
     NOT_MEASURABLE,
     cell,
     format_clock,
     format_coordinate,
 )
+from pipecore.geometry import ArcAxis, Array
+from pipecore.inspection.section import radius_is_measurable
 from pipecore.rules import outside_diameter
 from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipecore.types import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipecore.report.format import MINUS
+from pipecore.formatting import MINUS
 from pipegui.model import commands, view_commands
 from pipegui.model.colour_limits import shown_limits
 from pipegui.model.document import Box, ColourBy, Document, Scan, ViewOptions

@@ -14,9 +14,9 @@ from pipecore._kernels.neighbours import fit_planes
 from pipecore.cli.console import Console
 from pipecore.cli.parser import given_settings
 from pipecore.errors import WriteError
+from pipecore.formatting import format_clock, format_measure
 from pipecore.pipeline import detect
 from pipecore.report import by_verdict, summarise, write_report
-from pipecore.report.format import format_clock, format_measure
 from pipecore.rules import load_rule, outside_diameter
 from pipecore.settings import Settings
 from pipecore.tiling import GIB, detect_in_tiles, estimate_need

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipecore import io
 from pipecore.cli.console import Console
-from pipecore.report.format import format_count
+from pipecore.formatting import format_count
 
 
 def run(args: argparse.Namespace, console: Console) -> None:

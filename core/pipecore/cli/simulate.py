@@ -6,7 +6,7 @@ from dataclasses import replace
 from pipecore import io
 from pipecore.cli.console import Console
 from pipecore.errors import WriteError
-from pipecore.report.format import format_count
+from pipecore.formatting import format_count
 from pipecore.simulate import find_scene, scan
 
 

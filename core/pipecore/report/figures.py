@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pipecore.formatting import format_clock
 from pipecore.inspection.deviation_grid import clock_from, grid_deviation
 from pipecore.inspection.points import ElementPoints, element_points
 from pipecore.inspection.radius_pattern import radius_pattern
-from pipecore.report.format import format_clock
 from pipecore.types import (
     OWN_STACK,
     Array,

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 import pipecore
 from pipecore._kernels.grouping import group_by_label
 from pipecore.allocation import BLOCK
-from pipecore.geometry import ArcAxis
-from pipecore.progress import NoProgress, Progress
-from pipecore.report.format import (
+from pipecore.formatting import (
     NOT_MEASURABLE,
     format_clock,
     format_count,
     format_measure,
 )
+from pipecore.geometry import ArcAxis
+from pipecore.progress import NoProgress, Progress
 from pipecore.report.summary import VERDICT_ORDER, by_verdict, summarise
 from pipecore.report.world import FileCoordinates
 from pipecore.resources import resource

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from pipecore.report.format import format_count
+from pipecore.formatting import format_count
 from pipecore.types import Deformation, ElementKind, Result, Verdict
 
 VERDICT_ORDER = (Verdict.REJECT, Verdict.REVIEW, Verdict.NOT_MEASURABLE, Verdict.ACCEPT)

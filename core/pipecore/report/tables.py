@@ -16,10 +16,10 @@ from typing import Any, TextIO
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.formatting import cell, format_clock, text_cell
 from pipecore.geometry import ArcAxis
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress, in_chunks
-from pipecore.report.format import cell, format_clock, text_cell
 from pipecore.report.world import FileCoordinates
 from pipecore.rules import outside_diameter
 from pipecore.types import Array, Deformation, Element, ElementKind, Profiles, Result, Review

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.report.format import cell, format_coordinate
+from pipecore.formatting import cell, format_coordinate
 from pipecore.settings import LengthUnit
 from pipecore.types import Array, Result
 

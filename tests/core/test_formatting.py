@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipecore.report.format import (
+from pipecore.formatting import (
     NOT_MEASURABLE,
     cell,
     format_clock,
