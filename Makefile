@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock venv system-packages clean
+.PHONY: help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock wheels venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -63,13 +63,17 @@ format: venv ## Lay out the code and mend what can be mended
 	$(VENV)/bin/ruff check --fix
 	$(VENV)/bin/ruff format
 
-lock: ## Bring requirements.lock up to what pyproject.toml asks for (needs uv)
+lock: ## Bring requirements.lock up to what both pyproject.toml ask for (needs uv)
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
-	    --custom-compile-command "make lock" --extra dev pyproject.toml -o requirements.lock
+	    --no-emit-package pipegui-core --custom-compile-command "make lock" \
+	    --extra all --extra dev pyproject.toml -o requirements.lock
+
+wheels: venv ## Build the wheels of the library and of the app into dist
+	$(PYTHON) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist ./core .
 
 venv: $(STAMP) ## Make or renew the environment .venv
 
-$(STAMP): requirements.lock pyproject.toml installer/environment.sh | system-packages
+$(STAMP): requirements.lock pyproject.toml core/pyproject.toml installer/environment.sh | system-packages
 	@installer/environment.sh
 	@touch $@
 

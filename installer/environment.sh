@@ -1,5 +1,6 @@
 #!/bin/sh
-# Makes or renews .venv with the packages of requirements.lock, and this project in it, editable.
+# Makes or renews .venv with the packages of requirements.lock, and in it the library and the app,
+# editable.
 set -eu
 cd "$(dirname "$0")/.."
 export PIP_DISABLE_PIP_VERSION_CHECK=1
@@ -17,6 +18,11 @@ if ! .venv/bin/python -c 'import pip' 2>/dev/null; then
     .venv/bin/python -m ensurepip >/dev/null
 fi
 
+# Both kinds of open3d bring the same files: the one with CUDA has to leave before the other comes.
+if [ "$(uname -sm)" = "Linux x86_64" ]; then
+    .venv/bin/python -m pip uninstall --quiet --quiet --yes open3d
+fi
 echo "Installing the Python packages of requirements.lock (some minutes the first time) …"
 .venv/bin/python -m pip install --quiet --no-deps --require-hashes -r requirements.lock
-.venv/bin/python -m pip install --quiet --no-deps --no-build-isolation --no-index --editable .
+.venv/bin/python -m pip install --quiet --no-deps --no-build-isolation --no-index \
+    --editable core --editable .

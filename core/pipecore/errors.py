@@ -41,6 +41,10 @@ class SceneError(PipecoreError):
     """A description of a scene for the simulator is not valid."""
 
 
+class MissingPackageError(PipecoreError):
+    """A package that only some installations have is needed."""
+
+
 class CancelledError(PipecoreError):
     """The user cancelled the work."""
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.errors import SceneError
+from pipecore.errors import MissingPackageError, SceneError
 from pipecore.geometry import Array
 from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.simulate.clutter import clutter_parts
@@ -111,7 +111,12 @@ class World:
     """All parts of a scene, ready for rays."""
 
     def __init__(self, parts: list[Part]) -> None:
-        import open3d as o3d  # noqa: PLC0415  (takes seconds; only simulations pay)
+        try:
+            import open3d as o3d  # noqa: PLC0415  (takes seconds; only simulations pay)
+        except ModuleNotFoundError as error:
+            raise MissingPackageError(
+                "Simulating scans needs the package open3d: pip install 'pipegui-core[open3d]'."
+            ) from error
 
         tensor: Any = o3d.core.Tensor
         self._tensor = tensor
