@@ -19,7 +19,7 @@ from pipecore.io import file_filter
 from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
 from pipecore.resources import resource
-from pipecore.rules import list_rules
+from pipecore.rules import MEASURE_TEXTS, list_rules
 from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
 from pipecore.types import KIND_LABELS, DeformationKind, ElementKind, ReviewState, Verdict
 from pipegui.i18n.texts import DOMAIN, LANGUAGES
@@ -69,6 +69,7 @@ def tables() -> Iterator[str]:
     for enum in (ElementKind, DeformationKind, Verdict, ReviewState):
         yield from (str(value) for value in enum)
     yield from KIND_LABELS.values()
+    yield from MEASURE_TEXTS.values()
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():

@@ -16,7 +16,14 @@ import numpy as np
 
 from pipecore.errors import SettingsError
 from pipecore.resources import resource
-from pipecore.types import Deformation, DeformationKind, Element, ElementKind, Verdict
+from pipecore.types import (
+    KIND_LABELS,
+    Deformation,
+    DeformationKind,
+    Element,
+    ElementKind,
+    Verdict,
+)
 
 BAND_SD = 2.0
 """Half width of the band around a limit, in standard deviations, that is to be reviewed."""
@@ -32,13 +39,14 @@ class Measure(StrEnum):
     OVALITY_MM = "ovality_mm"
 
 
-_SPOKEN = {
+MEASURE_TEXTS = {
     Measure.DEPTH_MM: "depth at most {:g} mm",
     Measure.DEPTH_PCT_OD: "depth at most {:g} % of the outside diameter",
     Measure.DEPTH_PCT_LENGTH: "at most {:g} % of the length",
     Measure.OVALITY_PCT: "ovality at most {:g} %",
     Measure.OVALITY_MM: "Dmax − Dmin at most {:g} mm",
 }
+"""What a criterion asks for, with a field for its limit."""
 
 
 @dataclass(frozen=True)
@@ -101,12 +109,12 @@ class Criterion:
         """Return the criterion as a person would say it."""
         parts = [", ".join(self.kinds)]
         if self.element_kinds:
-            parts.append("on " + ", ".join(self.element_kinds))
+            parts.append("on " + ", ".join(KIND_LABELS[k].lower() for k in self.element_kinds))
         if self.od_above_mm > 0:
             parts.append(f"OD above {self.od_above_mm:g} mm")
         if np.isfinite(self.od_up_to_mm):
             parts.append(f"OD up to {self.od_up_to_mm:g} mm")
-        return " · ".join(parts) + ": " + _SPOKEN[self.measure].format(self.limit)
+        return " · ".join(parts) + ": " + MEASURE_TEXTS[self.measure].format(self.limit)
 
 
 @dataclass(frozen=True)

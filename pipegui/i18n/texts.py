@@ -16,7 +16,7 @@ from pipecore.formatting import format_measure as _format_measure
 from pipecore.resources import resource
 from pipecore.types import Element, Result
 
-LANGUAGES = {"": "As the system", "en": "English", "de": "Deutsch"}
+LANGUAGES = {"": "System", "en": "English", "de": "Deutsch"}
 """Names of the languages by their codes, each in its own; "" is the system's."""
 DOMAIN = "pipegui"
 TRANSLATED_VALUES = ("cause", "reason", "shape")

@@ -30,11 +30,16 @@ class ColourBy(StrEnum):
 class Background(StrEnum):
     """What lies behind the points."""
 
-    SYSTEM = "As the system"
+    SYSTEM = "System"
     LIGHT = "Light"
     DARK = "Dark"
     WHITE = "White"
     BLACK = "Black"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Background | None":
+        # As projects of version 0.1 have it.
+        return cls.SYSTEM if value == "As the system" else None
 
 
 class Tool(StrEnum):

@@ -175,7 +175,7 @@ COLUMNS = (
         lambda r: format_measure(1000 * r.deformation.depth, 1000 * r.deformation.depth_sd),
         lambda r: cell(1000 * r.deformation.depth, 2),
         lambda r: r.deformation.depth,
-        mark("Gap to the undented contour, ± one standard deviation"),
+        mark("Against the undented contour, ± one standard deviation. Of a bulge: its height."),
         field="depth",
     ),
     _number(
@@ -183,7 +183,7 @@ COLUMNS = (
         mark("% OD"),
         lambda r: 100 * r.deformation.depth / outside_diameter(r.element),
         1,
-        mark("Depth in percent of the outside diameter"),
+        mark("Depth or height in percent of the outside diameter"),
     ),
     _number(
         "length_mm",

@@ -39,7 +39,7 @@ class FilterBar(QWidget):
         states = [(tr(s), s, theme.icon(REVIEW_ICON[s])) for s in ReviewState]
         self.review = self._choice("review", states)
         self.min_depth = QuietSpinBox()
-        self.min_depth.setAccessibleName(tr("Filter by depth"))
+        self.min_depth.setAccessibleName(tr("Filter by depth or height"))
         self.min_depth.setToolTip(tr("Hide what is shallower"))
         self.min_depth.setRange(0, 1000)
         self.min_depth.setPrefix("≥ ")

@@ -34,7 +34,7 @@ class TableColumns(QObject):
             action.setCheckable(True)
             action.toggled.connect(lambda on, key=column.key: self._set_one(key, on))
         self.menu.addSeparator()
-        self.menu.addAction(tr("As at first"), self._reset)
+        self.menu.addAction(tr("Reset columns"), self._reset)
         self._prepare_header()
         self.show(())
         view.viewport().installEventFilter(self)

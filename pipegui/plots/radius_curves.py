@@ -10,7 +10,7 @@ from pipecore.formatting import cell
 from pipecore.geometry import Array
 from pipecore.inspection.radius_pattern import RadiusPattern, radius_pattern
 from pipecore.inspection.section import radius_is_measurable
-from pipecore.rules import DentLimit
+from pipecore.rules import MEASURE_TEXTS, DentLimit
 from pipecore.types import Element, Profiles
 from pipegui.i18n.texts import format_measure, label_of, tr
 from pipegui.plots.chart import faint
@@ -93,8 +93,10 @@ def row_text(profiles: Profiles, row: int) -> str:
 
 
 def limit_text(limit: DentLimit) -> str:
-    """Return which rule sets the limit for dents, and by which criterion."""
-    return f"{tr(limit.rule.title)}\n{limit.criterion}"
+    """Return which rule sets the limit for dents, and what it asks for."""
+    criterion = limit.criterion
+    asked = tr(MEASURE_TEXTS[criterion.measure]).format(criterion.limit)
+    return f"{tr(limit.rule.title)}\n{asked}"
 
 
 def legend(

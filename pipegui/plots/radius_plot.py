@@ -116,7 +116,7 @@ class RadiusPlot(Chart):
         self.shown_menu = SeriesMenu(SERIES, AT_FIRST, ("centre", "difference"), self)
         self.shown_menu.changed.connect(self._redraw)
         self.shown_menu.addSeparator()
-        self.shown_menu.addAction(tr("Take all pins off"), self.pins_cleared.emit)
+        self.shown_menu.addAction(tr("Unpin all"), self.pins_cleared.emit)
         self.shown_button = self.tool_button(tr("What is plotted"), "tune-variant")
         self.shown_button.setMenu(self.shown_menu)
         self.shown_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)

@@ -44,7 +44,7 @@ LAYERS = {
     "reference": mark("Undeformed contour"),
     "nominal": mark("Nominal size"),
     "dimensions": mark("Dimensions"),
-    "curvature": mark("Curvature"),
+    "curvature": mark("Curvature × radius (1 where round)"),
 }
 AT_FIRST = frozenset(LAYERS) - {"nominal"}
 
@@ -64,7 +64,10 @@ class SectionView(Chart):
         self._make_header()
         self.plot = self.add_plot(0, "mm")
         self.plot.setAspectLocked(True)
-        self.curvature = self.add_plot(1, "κ · r")
+        self.curvature = self.add_plot(1, tr("curvature × r"))
+        self.curvature.setToolTip(
+            tr("Curvature of the fitted curve times the radius: 1 where the section is round")
+        )
         self.curvature.getAxis("bottom").setTicks([HOURS])
         self.curvature.setLimits(xMin=-20, xMax=380)
         self.canvas.ci.layout.setRowStretchFactor(0, 3)

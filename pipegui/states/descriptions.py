@@ -205,7 +205,7 @@ def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
     middle = cloud.world((low + high) / 2)
     for name, value in zip("XYZ", middle, strict=True):
         yield Property(
-            tr("Middle {name}").format(name=name),
+            tr("Centre {name}").format(name=name),
             f"{format_coordinate(float(value))} m",
             f"{value:.4f}",
         )
@@ -302,10 +302,12 @@ def _of_deformation(
     verdict = deformation.verdict
     rule = tr("By the rule “{rule}”").format(rule=deformation.rule)
     yield Property(tr("Verdict"), tr(verdict), str(verdict), hint=rule, verdict=verdict)
-    yield _measure(tr("Depth"), deformation.depth, deformation.depth_sd)
-    yield _measure(
-        tr("Depth of OD"), deformation.depth * share, deformation.depth_sd * share, unit="%"
+    is_bulge = deformation.kind is DeformationKind.BULGE
+    name, of_od = (
+        (tr("Height"), tr("Height of OD")) if is_bulge else (tr("Depth"), tr("Depth of OD"))
     )
+    yield _measure(name, deformation.depth, deformation.depth_sd)
+    yield _measure(of_od, deformation.depth * share, deformation.depth_sd * share, unit="%")
     size = f"{1000 * deformation.length:.0f} × {1000 * deformation.width:.0f}"
     yield Property(tr("Length × width"), f"{size} mm", size, hint=tr("Along the axis × around."))
     yield _measure(tr("Chainage"), deformation.chainage, unit="m")

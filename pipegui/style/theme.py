@@ -64,7 +64,7 @@ VERDICT_ICON = {
 class Appearance(StrEnum):
     """Which colours the window has."""
 
-    SYSTEM = "As the system"
+    SYSTEM = "System"
     LIGHT = "Light"
     DARK = "Dark"
 

@@ -47,7 +47,7 @@ def _appearance(appearance: theme.Appearance) -> ActionSpec:
 
 
 def _language(code: str) -> ActionSpec:
-    name, tip = f"language_{code or 'system'}", "What the window speaks"
+    name, tip = f"language_{code or 'system'}", "Language of the window"
     return ActionSpec(name, LANGUAGES[code], tip, is_checkable=True)
 
 
@@ -80,7 +80,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _A("close_scan", "Close scan", "Close the active scan", "close", "Ctrl+W", "scan"),
         _SEPARATOR,
         _A("load_settings", "Load settings…", "Take the settings of a TOML file", "tune-variant"),
-        _A("save_settings", "Save settings…", "Keep the settings as a TOML file"),
+        _A("save_settings", "Save settings…", "Save the settings as a TOML file"),
         _SEPARATOR,
         _A("quit", "Quit", "Close the window", "", "Ctrl+Q"),
     ),
@@ -99,14 +99,35 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "several_elements idle",
         ),
         _A("split", "Split element…", "Cut the element", "set-split", "", "one_element idle"),
-        _A("kind", "Kind of element…", "Say what it is", "", "", "one_element idle"),
-        _A("size", "Nominal size…", "Say which catalogue size it has", "", "", "one_element"),
+        _A(
+            "kind",
+            "Kind of element…",
+            "Set whether it is a pipe, a bend or a fitting",
+            "",
+            "",
+            "one_element idle",
+        ),
+        _A("size", "Nominal size…", "Set its catalogue size", "", "", "one_element"),
         _SEPARATOR,
-        _A("go_up", "Go up", "Select what contains it", "arrow-up", "Esc", "escape"),
+        _A(
+            "go_up",
+            "Select parent",
+            "Select what contains the selection",
+            "arrow-up",
+            "Esc",
+            "escape",
+        ),
     ),
     "View": (
         _A("fit", "Fit to view", "Show the whole scan", "fit-to-screen-outline", "F", "scan"),
-        _A("zoom", "Zoom to selection", "Fly to it", "magnify-plus-outline", "Z", "selection"),
+        _A(
+            "zoom",
+            "Zoom to selection",
+            "Move the camera to the selection",
+            "magnify-plus-outline",
+            "Z",
+            "selection",
+        ),
         *_inside(
             "Standard views",
             _A("view_top", "From above", "Look down", "axis-z-arrow", "7", "scan"),
@@ -117,7 +138,9 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             _A("view_left", "From the west", "Look along +X", "", "Ctrl+3", "scan"),
             _A("view_iso", "From a corner", "Look from a corner", "axis-arrow", "0", "scan"),
         ),
-        _option("is_parallel", "Without perspective", "Equal lengths look equal everywhere", "5"),
+        _option(
+            "is_parallel", "Orthographic", "Parallel projection: equal lengths look equal", "5"
+        ),
         _option("fly", "Fly to the selection", "Move the camera to what is selected"),
         _SEPARATOR,
         _option("show_points", "Points", "Show the points", "P"),
@@ -148,13 +171,24 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "Drawing of points",
             _A("larger_points", "Larger points", "Draw points larger", "", "+", "scan"),
             _A("smaller_points", "Smaller points", "Draw points smaller", "", "-", "scan"),
-            _A("usual_points", "Usual point size", "Draw points as large as suits", "", "", "scan"),
-            _option("eye_dome", "Shade edges", "Darken steps in depth: shapes show without colour"),
+            _A(
+                "usual_points",
+                "Default point size",
+                "Draw points at their default size",
+                "",
+                "",
+                "scan",
+            ),
+            _option(
+                "eye_dome",
+                "Eye-dome lighting (EDL)",
+                "Darken steps in depth: shapes show without colour",
+            ),
         ),
         _A(
             "fit_limits",
-            "Fit limits",
-            "Limits of the colours that hold nearly all points",
+            "Auto colour range",
+            "Set the colour range so that it holds nearly all points",
             "",
             "",
             "scan",
@@ -179,7 +213,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         ),
         _A(
             "invert_clip",
-            "Outside of the clip box",
+            "Invert clip box",
             "Show what is outside the box instead of what is in it",
             "",
             "Ctrl+B",
@@ -285,9 +319,23 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "deformations",
         ),
         _SEPARATOR,
-        _A("accept", "Accept deformation", "Let it pass", "check", "Ctrl+Return", "deformation"),
-        _A("reject", "Reject deformation", "Not to pass", "close", "Ctrl+Backspace", "deformation"),
-        _A("reopen", "Leave deformation open", "To be looked at", "", "", "deformation"),
+        _A(
+            "accept",
+            "Accept deformation",
+            "Mark it as acceptable",
+            "check",
+            "Ctrl+Return",
+            "deformation",
+        ),
+        _A(
+            "reject",
+            "Reject deformation",
+            "Mark it as not acceptable",
+            "close",
+            "Ctrl+Backspace",
+            "deformation",
+        ),
+        _A("reopen", "Leave deformation open", "Mark it as not yet decided", "", "", "deformation"),
         _SEPARATOR,
         _A("isolate", "Isolate", "Hide all but the selection", "eye-outline", "I", "selection"),
         _A("hide", "Hide", "Hide the selection", "eye-off-outline", "H", "elements"),

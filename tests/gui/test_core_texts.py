@@ -71,7 +71,7 @@ def test_that_an_error_within_an_error_is_said_in_german_too(tmp_path):
 
 @pytest.mark.usefixtures("german")
 def test_that_reasons_are_said_in_german_with_their_numbers():
-    assert "120° Bogen" in reason_text("less than 120° of arc seen over 35 % of the length")
+    assert "120° des Umfangs" in reason_text("less than 120° of arc seen over 35 % of the length")
     assert reason_text("the noise allows no better than ± 1.4 %").endswith("± 1.4 %")
     assert reason_text("something new") == "something new"
 

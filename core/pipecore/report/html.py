@@ -172,6 +172,8 @@ def _remarks(d: Deformation, result: Result) -> list[str]:
     wanted = {name: why for name, why in d.not_measurable.items() if name != "strain"}
     if result.settings.deformation.wall_thickness_mm > 0:
         wanted = dict(d.not_measurable)
+    if d.kind is DeformationKind.BULGE and "depth" in wanted:
+        wanted["height"] = wanted.pop("depth")
     return remarks + [f"{name} {NOT_MEASURABLE}: {why}" for name, why in wanted.items()]
 
 
