@@ -1,7 +1,8 @@
 """The catalogues of translations: `python -m tools.translations` brings them up to the sources.
 
 Texts are found where the app calls `tr`, `mark`, `trn` and `count`, and where the core raises
-errors; those of tables that the core or the menus hold are taken from the tables themselves.
+errors or gives reasons; those of tables that the core or the menus hold are taken from the
+tables themselves.
 """
 
 from collections.abc import Iterator
@@ -31,9 +32,9 @@ from pipegui.window.action_table import MENUS, SPECS
 SOURCES = Path(__file__).parents[1] / "pipegui"
 KEYWORDS = {"tr": None, "mark": None, "trn": (1, 2), "count": (1, 2)}
 CORE = Path(__file__).parents[1] / "core" / "pipecore"
-ERRORS = dict.fromkeys(("ReadError", "WriteError", "SettingsError", "EditError"))
+ERRORS = dict.fromkeys(("ReadError", "WriteError", "SettingsError", "EditError", "Reason"))
 """Their first argument is a text; what is left out here is never shown in the window."""
-NOT_IN_THE_APP = ("simulate", "cli", "tiling")
+NOT_IN_THE_APP = ("simulate", "cli", "tiling", "ellipses")
 MORE_STAGES = (
     "reading",
     "normals",

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.reasons import Reason
 from pipecore.settings import Settings
 
 Array = NDArray[np.float64]
@@ -142,7 +143,7 @@ class Element:
         The catalogue size within tolerance, if any.
     gaps : tuple of (float, float)
         Chainage ranges without profiles (paper, figure 11).
-    not_measurable : mapping of str to str
+    not_measurable : mapping of str to Reason
         Why what is nan could not be measured, by the name of the field; what does not
         apply to the kind is not in it.
     name : str
@@ -166,7 +167,7 @@ class Element:
     straightness: float = np.nan
     nominal: NominalSize | None = None
     gaps: tuple[tuple[float, float], ...] = ()
-    not_measurable: Mapping[str, str] = field(default_factory=dict)
+    not_measurable: Mapping[str, Reason] = field(default_factory=dict)
     name: str = ""
 
     @property
@@ -367,7 +368,7 @@ class Deformation:
         Distance over the surface from edge to edge of the two, metres; 0 if they overlap.
     interacts : bool
         Whether that is at most one outside diameter.
-    not_measurable : mapping of str to str
+    not_measurable : mapping of str to Reason
         Why what is nan could not be measured, by the name of the field; what does not
         apply to the kind is not in it. Empty where all was measured.
     """
@@ -397,7 +398,7 @@ class Deformation:
     next_id: int = NO_ID
     next_distance: float = np.nan
     interacts: bool = False
-    not_measurable: Mapping[str, str] = field(default_factory=dict)
+    not_measurable: Mapping[str, Reason] = field(default_factory=dict)
 
 
 class ReviewState(StrEnum):

@@ -17,6 +17,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from pipecore.errors import SettingsError
+from pipecore.reasons import Reason
 from pipecore.settings import Settings
 
 
@@ -29,6 +30,8 @@ def to_plain(value: Any) -> Any:  # noqa: PLR0911 - one for each type
         return {"type": type(value).__name__} | fields
     if isinstance(value, np.ndarray | np.generic):
         return to_plain(value.tolist())
+    if isinstance(value, Reason) and value.values:
+        return {"template": value.template, "values": to_plain(value.values)}
     if isinstance(value, StrEnum | Path):
         return str(value)
     if isinstance(value, float):
@@ -72,6 +75,8 @@ def from_plain(kind: Any, plain: Any) -> Any:  # noqa: PLR0911 - one for each ty
     if isinstance(kind, type) and issubclass(kind, StrEnum):
         _expect(isinstance(plain, str), kind, plain)
         return kind(plain)
+    if kind is Reason:
+        return _reason(plain)
     if kind is float:
         return _float(plain)
     if kind is Path:
@@ -123,6 +128,18 @@ def _from_fields(kind: Any, plain: Any) -> Any:
 @cache
 def _hints(kind: Any) -> dict[str, Any]:
     return get_type_hints(kind)
+
+
+def _reason(plain: Any) -> Reason:
+    if isinstance(plain, str):
+        return Reason(plain)
+    _expect(isinstance(plain, dict) and {"template", "values"} <= plain.keys(), Reason, plain)
+    template, values = plain["template"], plain["values"]
+    _expect(isinstance(template, str) and isinstance(values, dict), Reason, plain)
+    try:
+        return Reason(template, **values)
+    except (LookupError, ValueError, TypeError) as error:
+        raise ValueError(f"{template[:40]!r} is not a reason") from error
 
 
 def _float(plain: Any) -> float:

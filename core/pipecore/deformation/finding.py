@@ -22,11 +22,14 @@ from pipecore.deformation.strain import dent_strain
 from pipecore.deformation.surface import Surface, own_surface
 from pipecore.deformation.unrolled import Unrolled, surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
+from pipecore.reasons import Reason
 from pipecore.settings import DeformationSettings
 from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind
 
 SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS, ElementKind.TEE)
 """Kinds whose contour is known well enough to look for deformations."""
+
+NO_REASON = Reason()
 
 STRAIN_SIGNIFICANCE = 5.0
 
@@ -67,7 +70,7 @@ class DeformationFinding:
         Of the mean section, ratios; nan where the arc cannot carry it.
     straightness : float
         Largest distance of the measured axis from its chord, metres; nan if unknown.
-    not_measurable : dict of str to str
+    not_measurable : dict of str to Reason
         Why the ovality or the straightness is nan where it would apply.
     """
 
@@ -79,7 +82,7 @@ class DeformationFinding:
     ovality: float = np.nan
     ovality_sd: float = np.nan
     straightness: float = np.nan
-    not_measurable: dict[str, str] = field(default_factory=dict)
+    not_measurable: dict[str, Reason] = field(default_factory=dict)
 
 
 def find_deformations(
@@ -110,7 +113,7 @@ def find_deformations(
             np.zeros(len(xyz), bool),
             points,
             None,
-            not_measurable=dict.fromkeys(_applicable(element), "too few points"),
+            not_measurable=dict.fromkeys(_applicable(element), Reason("too few points")),
         )
     heights = _height_map(element, surface, neighbours)
     arc = usable_arc(surface.grid, heights.covered)
@@ -143,7 +146,7 @@ def find_deformations(
     ]
     ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
     deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
-    straightness, why_not_straight = np.nan, ""
+    straightness, why_not_straight = np.nan, NO_REASON
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
         straightness, why_not_straight, bow = _measure_bow(
             element, surface, heights, patches, n_terms=n_terms, settings=settings
@@ -191,13 +194,16 @@ def _arc_at(heights: DeviationMap, patch: Patch) -> float:
     return float(np.median(_arcs(heights)[np.abs(grid.chainages - patch.chainage) <= reach]))
 
 
-def _why_no_dents(heights: DeviationMap) -> str:
-    """Why dents cannot be told along a good part of an element."""
+def _why_no_dents(heights: DeviationMap) -> Reason:
+    """Why dents are not measurable along a good part of an element; empty if they are."""
     short = float(np.mean(_arcs(heights) < MIN_DENT_ARC))
     if short < MAX_UNTOLD:
-        return ""
-    needed = np.rad2deg(MIN_DENT_ARC)
-    return f"less than {needed:.0f}° of arc seen over {100 * short:.0f} % of the length"
+        return NO_REASON
+    return Reason(
+        "less than {needed}° of arc seen over {share} % of the length",
+        needed=f"{np.rad2deg(MIN_DENT_ARC):.0f}",
+        share=f"{100 * short:.0f}",
+    )
 
 
 def _applicable(element: Element) -> tuple[str, ...]:
@@ -207,15 +213,20 @@ def _applicable(element: Element) -> tuple[str, ...]:
     return ("ovality", "straightness") if isinstance(element.axis, LineAxis) else ("ovality",)
 
 
-def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, str]:
-    """Ovality of the mean section with its standard deviation, or why it cannot be told."""
+def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, Reason]:
+    """Ovality of the mean section with its standard deviation, or why it is not measurable."""
     if contour.n_terms < 5:
-        seen, needed = np.rad2deg(arc), np.rad2deg(MIN_ARC)
-        return np.nan, np.nan, f"{seen:.0f}° of arc seen, {needed:.0f}° are needed"
+        why = Reason(
+            "{seen}° of arc seen, {needed}° are needed",
+            seen=f"{np.rad2deg(arc):.0f}",
+            needed=f"{np.rad2deg(MIN_ARC):.0f}",
+        )
+        return np.nan, np.nan, why
     ovality, sd = mean_ovality(contour)
     if sd > MAX_OVALITY_SD:
-        return np.nan, np.nan, f"the noise allows no better than ± {100 * sd:.1f} %"
-    return ovality, sd, ""
+        why = Reason("the noise allows no better than ± {sd} %", sd=f"{100 * sd:.1f}")
+        return np.nan, np.nan, why
+    return ovality, sd, NO_REASON
 
 
 def _height_map(element: Element, surface: Surface, neighbours: Sequence[Element]) -> DeviationMap:
@@ -250,7 +261,7 @@ def _as_deformation(
     inside = patch.cells(grid).ravel()[surface.cell] & surface.belongs
     strain, why = _strain(bump, radius, settings.wall_thickness_mm / 1000)
     if not bump.is_peak_seen:
-        why = dict.fromkeys(("depth", "volume", *why), "too few points at its peak")
+        why = dict.fromkeys(("depth", "volume", *why), Reason("too few points at its peak"))
     return Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
@@ -273,15 +284,17 @@ def _as_deformation(
     )
 
 
-def _strain(bump: Bump, radius: float, wall: float) -> tuple[float, dict[str, str]]:
-    """Strain of a dent, or why it cannot be told; neither for a bulge."""
+def _strain(bump: Bump, radius: float, wall: float) -> tuple[float, dict[str, Reason]]:
+    """Strain of a dent, or why it is not measurable; neither for a bulge."""
     if bump.height > 0:
         return np.nan, {}
     if wall == 0:
-        return np.nan, {"strain": "the wall thickness is not set"}
+        return np.nan, {"strain": Reason("the wall thickness is not set")}
     if abs(bump.height) < STRAIN_SIGNIFICANCE * bump.height_sd:
-        least = f"{STRAIN_SIGNIFICANCE:g} standard deviations"
-        return np.nan, {"strain": f"the depth is less than {least}"}
+        why = Reason(
+            "the depth is less than {least} standard deviations", least=f"{STRAIN_SIGNIFICANCE:g}"
+        )
+        return np.nan, {"strain": why}
     strain = dent_strain(
         depth=abs(bump.height),
         length=bump.length,
@@ -348,8 +361,8 @@ def _measure_bow(
     *,
     n_terms: int,
     settings: DeformationSettings,
-) -> tuple[float, str, list[Deformation]]:
-    """Straightness or why it cannot be told, and the bow or kink if it is one."""
+) -> tuple[float, Reason, list[Deformation]]:
+    """Straightness or why it is not measurable, and the bow or kink if it is one."""
     grid = surface.grid
     used = heights.count > 0
     for patch in patches:
@@ -366,13 +379,15 @@ def _measure_bow(
     line = measure_centre_line(contour)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
     if line.straightness_sd > settings.min_depth_mm / 1000:
-        why = f"the centre line is known to ± {1000 * line.straightness_sd:.0f} mm only"
+        why = Reason(
+            "the centre line is known to ± {sd} mm only", sd=f"{1000 * line.straightness_sd:.0f}"
+        )
         return np.nan, why, []
     if line.straightness < max(least, settings.significance * line.straightness_sd):
-        return line.straightness, "", []
+        return line.straightness, NO_REASON, []
     is_short = grid.length < MIN_BOW_LENGTH * 2 * grid.radius
     if is_short or line.explained < MIN_EXPLAINED:
-        return line.straightness, "", []
+        return line.straightness, NO_REASON, []
     deformation = Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
@@ -389,7 +404,7 @@ def _measure_bow(
         n_points=int(np.count_nonzero(surface.belongs)),
         significance=line.straightness / line.straightness_sd,
     )
-    return line.straightness, "", [deformation]
+    return line.straightness, NO_REASON, [deformation]
 
 
 def _peak(

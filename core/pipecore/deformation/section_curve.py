@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from pipecore._kernels import series as kernels
 from pipecore.ellipses.nonlinear import NoFit
 from pipecore.geometry import Array
+from pipecore.reasons import Reason
 
 MAX_ORDER = 10
 """Waves of a tenth of the circumference: shorter ones are noise in a terrestrial scan."""
@@ -171,13 +172,19 @@ def fit_section(
     theta, r = theta[known], r[known]
     n = len(theta)
     if n < MIN_POINTS:
-        return NoFit(f"only {n} points, {MIN_POINTS} are needed")
+        return NoFit(Reason("only {n} points, {needed} are needed", n=n, needed=MIN_POINTS))
     spans, n_points, aic, noise, coefficients, root = kernels.fit_series(
         theta, r, max_order, max_gap, LIMITS
     )
     if len(coefficients) == 0:
         arc = float((spans[:, 1] - spans[:, 0]).sum())
-        return NoFit(f"{np.rad2deg(arc):.0f}° of arc, {np.rad2deg(MIN_ARC):.0f}° are needed")
+        return NoFit(
+            Reason(
+                "{seen}° of arc, {needed}° are needed",
+                seen=f"{np.rad2deg(arc):.0f}",
+                needed=f"{np.rad2deg(MIN_ARC):.0f}",
+            )
+        )
     return SectionCurve(
         coefficients=coefficients,
         root=root,

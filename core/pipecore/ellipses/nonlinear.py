@@ -19,6 +19,7 @@ from pipecore.ellipses.distances import (
     radial_distances,
     to_parameters,
 )
+from pipecore.reasons import Reason
 
 Array = NDArray[np.float64]
 Model = Callable[[Array, Array], tuple[Array, Array]]
@@ -85,29 +86,10 @@ class FittedEllipse(PlaneEllipse):
     weights: Array
 
     @property
-    def centre_sd(self) -> Array:
-        """Standard deviations of the centre's coordinates, shape (2,)."""
-        return np.sqrt(np.diag(self.covariance)[:2])
-
-    @property
-    def semi_major_sd(self) -> float:
-        """Standard deviation of the semi-major axis."""
-        return self._sd(0.0, 0.0, 1.0, np.cos(2 * self.angle), np.sin(2 * self.angle))
-
-    @property
     def semi_minor_sd(self) -> float:
         """Standard deviation of the semi-minor axis."""
-        return self._sd(0.0, 0.0, 1.0, -np.cos(2 * self.angle), -np.sin(2 * self.angle))
-
-    @property
-    def angle_sd(self) -> float:
-        """Standard deviation of the angle, radians; inf for a circle."""
-        h = 0.5 * (self.semi_major - self.semi_minor)
-        across = self._sd(0.0, 0.0, 0.0, -np.sin(2 * self.angle), np.cos(2 * self.angle))
-        return across / (2 * h) if h > 0 else np.inf
-
-    def _sd(self, *gradient: float) -> float:
-        g = np.array(gradient)
+        # Its derivatives by the five parameters.
+        g = np.array([0.0, 0.0, 1.0, -np.cos(2 * self.angle), -np.sin(2 * self.angle)])
         return float(np.sqrt(g @ self.covariance @ g))
 
 
@@ -115,7 +97,7 @@ class FittedEllipse(PlaneEllipse):
 class NoFit:
     """Why points carry no ellipse or other curve. It is false."""
 
-    reason: str
+    reason: Reason
 
     def __bool__(self) -> Literal[False]:
         return False
@@ -167,22 +149,24 @@ def fit_nonlinear_ellipse(
         raise ValueError("points must be an (n, 2) array of finite numbers")
     n_needed = 2 * N_PARAMETERS if robust else N_PARAMETERS + 1
     if len(xy) < n_needed:
-        return NoFit(f"{len(xy)} points are too few; {n_needed} are needed.")
+        return NoFit(
+            Reason("{n} points are too few; {needed} are needed.", n=len(xy), needed=n_needed)
+        )
     middle = xy.mean(axis=0)
     scale = float(np.sqrt(((xy - middle) ** 2).sum(axis=1).mean()))
     if not scale > 1e-12 * np.abs(middle).max():
-        return NoFit("All points lie in one place.")
+        return NoFit(Reason("All points lie in one place."))
     scaled = (xy - middle) / scale
     if np.linalg.svd(scaled, compute_uv=False)[1] < 1e-9 * np.sqrt(len(xy)):
-        return NoFit("The points lie on a straight line.")
+        return NoFit(Reason("The points lie on a straight line."))
 
     first = _first(scaled, robust) if start is None else _start(start, middle, scale)
     if first is None:
-        return NoFit("No ellipse passes near the points.")
+        return NoFit(Reason("No ellipse passes near the points."))
     model = orthogonal_distances if distance is Distance.ORTHOGONAL else radial_distances
     fit = (_reweighted if robust else _least_squares)(model, scaled, first)
     if fit is None:
-        return NoFit("The points do not tell an ellipse from a parabola.")
+        return NoFit(Reason("The points do not tell an ellipse from a parabola."))
     return _judge(fit, middle, scale, max_sd_share)
 
 
@@ -216,14 +200,17 @@ def _judge(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> Fitte
         ellipse.semi_minor < (1 - MAX_FLATTENING) * ellipse.semi_major
         or ellipse.semi_major > MAX_REACH * scale
     ):
-        return NoFit("The points do not tell an ellipse from a line or a parabola.")
+        return NoFit(Reason("The points do not tell an ellipse from a line or a parabola."))
     if fit.condition > MAX_CONDITION:
-        return NoFit("The points do not determine all five parameters of an ellipse.")
+        return NoFit(Reason("The points do not determine all five parameters of an ellipse."))
     if ellipse.semi_minor_sd > max_sd_share * ellipse.semi_minor:
         share = 100 * ellipse.semi_minor_sd / ellipse.semi_minor
         return NoFit(
-            "The arc is too short for a free ellipse: "
-            f"its semi-minor axis would be known to ±{share:.0f} % only."
+            Reason(
+                "The arc is too short for a free ellipse: "
+                "its semi-minor axis would be known to ±{share} % only.",
+                share=f"{share:.0f}",
+            )
         )
     return ellipse
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.geometry import Array, twelve_o_clock
+from pipecore.reasons import Reason
 from pipecore.types import Element, Profiles
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ class Section:
         The contour of the nominal size, about the same axis.
     curve : SectionCurve, optional
         The smooth curve through the points, about the centre of `reference`.
-    no_curve : str
+    no_curve : Reason
         Why there is none.
     """
 
@@ -104,7 +105,7 @@ class Section:
     reference: PlaneEllipse
     nominal: PlaneEllipse | None = None
     curve: "SectionCurve | None" = None
-    no_curve: str = ""
+    no_curve: Reason = Reason()
 
     @property
     def is_radius_measurable(self) -> bool:
@@ -203,5 +204,5 @@ def cut_section(element: Element, profile: Profiles, xyz: Array) -> Section:
         contour(float(element.radius_at(chainage))),
         nominal,
         curve if isinstance(curve, SectionCurve) else None,
-        "" if isinstance(curve, SectionCurve) else str(curve.reason),
+        Reason() if isinstance(curve, SectionCurve) else curve.reason,
     )
