@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipecore.geometry import Array
+from pipecore.robust import robust_sd
 from pipecore.types import Element, Profiles
-
-MAD_TO_SD = 1.4826
-"""Standard deviation of normal values per median absolute deviation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +67,7 @@ def radius_pattern(element: Element, profiles: Profiles) -> RadiusPattern:
     fitted = np.asarray(element.radius_at(profiles.chainage), np.float64)
     off = (values - fitted)[np.isfinite(values)]
     middle = float(np.median(off)) if len(off) else np.nan
-    scatter = MAD_TO_SD * float(np.median(np.abs(off - middle))) if len(off) else np.nan
+    scatter = robust_sd(off - middle) if len(off) else np.nan
     return RadiusPattern(values, profiles.semi_minor_sd, fitted, fitted + middle, scatter)
 
 

@@ -11,6 +11,7 @@ from pipecore.io.reading import FARTHEST
 from pipecore.io.registry import identify
 from pipecore.io.source import Source
 from pipecore.progress import NoProgress, Progress
+from pipecore.robust import sample_evenly
 from pipecore.types import Array
 
 SAMPLE_POINTS = 500_000
@@ -153,6 +154,6 @@ def _median_spacing(points: Array) -> float:
     if len(points) < 2:
         return float("nan")
     local = points - points[0]
-    queries = local[np.linspace(0, len(local) - 1, min(len(local), SAMPLE_QUERIES)).astype(int)]
+    queries = sample_evenly(local, SAMPLE_QUERIES)
     distances, _ = cKDTree(local, balanced_tree=False).query(queries, k=2)
     return float(np.median(distances[:, 1]))

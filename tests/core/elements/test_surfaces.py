@@ -9,9 +9,9 @@ from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SphereSurface,
     fit_surface,
-    robust_sigma,
 )
 from pipecore.geometry import ArcAxis, LineAxis, unit
+from pipecore.robust import robust_sd
 from tests.core.shapes import ball, random_direction, random_rotation, tube
 
 KINDS = ["cylinder", "cone", "torus", "sphere"]
@@ -149,11 +149,11 @@ def test_that_points_which_carry_no_surface_give_none(rng):
     assert fit_surface(SphereSurface(np.zeros(3), 0.1), np.tile(few[:1], (50, 1)), 0.005) is None
 
 
-def test_that_the_robust_sigma_is_the_standard_deviation_of_normal_errors(rng):
+def test_that_the_robust_sd_is_the_standard_deviation_of_normal_errors(rng):
     errors = 0.003 * rng.normal(size=20_000)
-    assert robust_sigma(errors) == pytest.approx(0.003, rel=0.03)
+    assert robust_sd(errors) == pytest.approx(0.003, rel=0.03)
     errors[:1000] = 1.0
-    assert robust_sigma(errors) == pytest.approx(0.003, rel=0.1)
+    assert robust_sd(errors) == pytest.approx(0.003, rel=0.1)
 
 
 @pytest.mark.parametrize("arc_deg", [120, 150])

@@ -23,11 +23,11 @@ from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SurfaceFit,
     fit_surface,
-    robust_sigma,
 )
 from pipecore.geometry import ArcAxis, cross, unit
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
+from pipecore.robust import TUKEY_REACH, robust_sd, sample_evenly
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -294,16 +294,16 @@ def fit_bend(
     ball = ball[usable[ball]]
     _, xyz, normals = nearby.of_cloud(ball)
     if len(xyz) > MAX_POINTS:
-        order = np.lexsort(xyz.T)[np.linspace(0, len(xyz) - 1, MAX_POINTS).astype(np.intp)]
+        order = sample_evenly(np.lexsort(xyz.T), MAX_POINTS)
         xyz, normals = xyz[order], normals[order]
     scale, bend_sd = 3.0 * sigma, np.inf
     for _ in range(N_STEPS):
         residual, slope, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
         radial = np.abs(np.einsum("ij,ij->i", normals, outward)) > RADIAL_COS
-        near = radial & (np.abs(residual) < 4.685 * scale)
+        near = radial & (np.abs(residual) < TUKEY_REACH * scale)
         if (near & in_bend).sum() < MIN_POINTS:
             return None
-        weight = np.square(1.0 - np.square(residual[near] / (4.685 * scale)))
+        weight = np.square(1.0 - np.square(residual[near] / (TUKEY_REACH * scale)))
         design = np.stack([slope[near], -1.0 * in_bend[near]], axis=1)
         normal_matrix = design.T @ (weight[:, None] * design)
         if np.linalg.cond(normal_matrix) > 1e10:
@@ -311,7 +311,7 @@ def fit_bend(
         step = np.linalg.solve(normal_matrix, -design.T @ (weight * residual[near]))
         bend_radius += float(np.clip(step[0], -0.2 * bend_radius, 0.2 * bend_radius))
         radius += float(step[1])
-        shown = robust_sigma(residual[near])
+        shown = robust_sd(residual[near])
         scale = min(scale, max(shown, 0.7 * scale, 1e-5))
         bend_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[0, 0]))
         radius_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[1, 1]))

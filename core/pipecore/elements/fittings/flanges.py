@@ -15,9 +15,10 @@ from scipy import ndimage
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.nearby_points import OUTER, NearbyPoints
 from pipecore.elements.refinement.refine import Fitted
-from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit, robust_sigma
+from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs import Lines
 from pipecore.geometry import LineAxis
+from pipecore.robust import robust_sd
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -178,7 +179,7 @@ def _fit_ring(
         if on.sum() < MIN_POINTS:
             return None
         radius = float(np.median(rho[on]))
-        sigma = max(robust_sigma(rho[on] - radius), 0.0003)
+        sigma = max(robust_sd(rho[on] - radius), 0.0003)
     low, high = np.quantile(chainage[on], [0.01, 0.99])
     if not MIN_LENGTH < high - low < MAX_LENGTH * radius:
         return None

@@ -17,6 +17,7 @@ from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import RADIAL_COS
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.geometry import cross, unit
+from pipecore.robust import sample_evenly
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -111,9 +112,7 @@ def follow_end(
     near = (place[0] > STARTS[0]) & (np.hypot(place[1], place[2]) < ASIDE)
     if near.sum() < MIN_POINTS:
         return None
-    rows = np.flatnonzero(near)
-    if len(rows) > MAX_POINTS:
-        rows = rows[np.linspace(0, len(rows) - 1, MAX_POINTS).astype(np.intp)]
+    rows = sample_evenly(np.flatnonzero(near), MAX_POINTS)
     view = _View(
         np.ascontiguousarray(place[:, rows]),
         np.ascontiguousarray(frame @ nearby.surface.normals[ball[rows]].T),

@@ -21,9 +21,9 @@ from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SurfaceFit,
     fit_surface,
-    robust_sigma,
 )
 from pipecore.geometry import LineAxis, unit
+from pipecore.robust import robust_sd, sample_evenly
 
 Array = NDArray[np.float64]
 
@@ -219,8 +219,7 @@ def fit_reducer(
     if len(points) < MIN_POINTS:
         return None
     band = max(5.0 * nearby.surface.noise, 0.005)
-    sample = xyz[np.linspace(0, len(xyz) - 1, min(len(xyz), MOST_POINTS)).astype(np.intp)]
-    begin, end = _best_ends(step, sample, low, high, band)
+    begin, end = _best_ends(step, sample_evenly(xyz, MOST_POINTS), low, high, band)
     return _fitted(step, begin, end, straights, nearby, points, band)
 
 
@@ -261,7 +260,7 @@ def _fitted(
     beside = between & (rho > step.narrow - band) & (rho < step.wide + band)
     if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
         return None
-    own, sigma = points[on], max(robust_sigma(residual[on]), LEAST_SIGMA)
+    own, sigma = points[on], max(robust_sd(residual[on]), LEAST_SIGMA)
     lean = lean_of(normals[on], outward[on], axis.tangent(chainage[on]))
     extent = find_extent(
         chainage[on], clock[on], residual[on], lean, lambda *_: np.empty((2, 0)),

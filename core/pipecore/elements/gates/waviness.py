@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels.misfit import least_distances
-from pipecore.elements.refinement.surface_fits import robust_sigma
+from pipecore.robust import robust_sd
 
 Array = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc:
     if used.sum() < design.shape[1] + 6:
         return np.nan
     within = (residual - mean[of_cell]) * np.sqrt(n / np.maximum(n - 1.0, 1.0))[of_cell]
-    noise = max(robust_sigma(within[used[of_cell]]), 1e-6)
+    noise = max(robust_sd(within[used[of_cell]]), 1e-6)
     mean, expected = mean[used], noise / np.sqrt(n[used])
     left = least_distances(design, mean, expected, N_STEPS)
     scatter = np.median(np.square(left / expected)) / HALF_OF_SQUARES

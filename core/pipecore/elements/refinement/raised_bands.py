@@ -8,6 +8,8 @@ shows two levels that alternate; the pipe is the lower one.
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.robust import robust_sd
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -54,7 +56,7 @@ def is_off_bands(chainage: Array, residual: Array, spacing: float, radius: float
     if len(told) < 4 * MIN_BANDS:
         return None
     low, high = _two_levels(told)
-    scatter = 1.4826 * float(np.median(np.abs(residual - level[row])[is_told[row]]))
+    scatter = robust_sd((residual - level[row])[is_told[row]])
     level_sd = 1.2533 * scatter / np.sqrt(np.median(n[is_told]))
     is_own = level < low + NEAR_LEVEL * (high - low)
     is_band = level > low + 0.5 * (high - low)

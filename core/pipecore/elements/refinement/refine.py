@@ -28,6 +28,7 @@ from pipecore.elements.refinement.surface_fits import (
 )
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, LineAxis, cross
+from pipecore.robust import sample_evenly
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -229,20 +230,13 @@ def _band(sigma: float) -> float:
     return max(5.0 * sigma, 0.0025)
 
 
-def _evenly(rows: NDArray[Any], limit: int) -> NDArray[Any]:
-    """At most `limit` of the rows, evenly spread over them."""
-    if len(rows) <= limit:
-        return rows
-    return rows[np.linspace(0, len(rows) - 1, limit).astype(np.intp)]
-
-
 def _fit_roughly(
     model: AnySurface, thinned: Indices, nearby: NearbyPoints, scale: float
 ) -> SurfaceFit[Any] | None:
     """Fit the model to thinned points."""
     if len(thinned) < LEAST_POINTS:
         return None
-    points = nearby.surface.xyz[_evenly(thinned, MAX_ROUGH_POINTS)]
+    points = nearby.surface.xyz[sample_evenly(thinned, MAX_ROUGH_POINTS)]
     return _fit_sample(model, points, scale, min(len(thinned), SURE_POINTS))
 
 
@@ -302,10 +296,10 @@ def fit_measured(
     if len(thinned) < LEAST_POINTS:
         return None
     _, points = nearby.behind(thinned)
-    points = _evenly(points, MAX_FIT_POINTS)
+    points = sample_evenly(points, MAX_FIT_POINTS)
     start = model
     if len(points) > MANY_POINTS:
-        sampled = _fit_sample(model, _evenly(points, SURE_POINTS), scale, len(points))
+        sampled = _fit_sample(model, sample_evenly(points, SURE_POINTS), scale, len(points))
         if sampled is None or not (
             holds(sampled) or _off_bands(sampled, thinned, nearby, spacing) is not None
         ):
@@ -319,7 +313,7 @@ def fit_measured(
         return fit
     if len(own) >= LEAST_POINTS:
         _, points = nearby.behind(own)
-        fit = fit_surface(fit.model, _evenly(points, MAX_FIT_POINTS), 3.0 * fit.sigma)
+        fit = fit_surface(fit.model, sample_evenly(points, MAX_FIT_POINTS), 3.0 * fit.sigma)
         if fit is not None and _is_still(fit, model):
             return fit
     return None

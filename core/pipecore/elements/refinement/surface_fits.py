@@ -209,11 +209,6 @@ class SurfaceFit(Generic[Model]):
         return float(np.sqrt(self.covariance[k, k]))
 
 
-def robust_sigma(residuals: Array) -> float:
-    """Standard deviation from the median absolute residual."""
-    return float(1.4826 * np.median(np.abs(residuals)))
-
-
 def fit_surface(
     model: Model, xyz: Array, scale: float, n_iterations: int = 30, *, is_rough: bool = False
 ) -> SurfaceFit[Model] | None:
