@@ -64,7 +64,7 @@ def measure_elements(
     `allocate` makes the arrays with a value for each point of the cloud.
     """
     everything = built.elements + others
-    boxes = _boxes(everything)
+    boxes = bounding_boxes(everything)
     element_id, deviation = _of_no_element(n_points, allocate)
     measured: dict[int, _Measured] = {}
     # The largest first: at the end of one that is begun late the other threads would wait.
@@ -177,7 +177,7 @@ def _size(element: Element) -> float:
     return element.axis.length * max(element.radius, element.radius_end)
 
 
-def _boxes(elements: Sequence[Element]) -> tuple[Array, Array, Array]:
+def bounding_boxes(elements: Sequence[Element]) -> tuple[Array, Array, Array]:
     """Lowest and highest coordinates of the elements' axes, each (n, 3), and their radii (n,)."""
     low, high = np.empty((2, len(elements), 3))
     for i, element in enumerate(elements):

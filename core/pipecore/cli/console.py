@@ -80,6 +80,7 @@ class Console:
                 total=100,
                 desc=stage.capitalize(),
                 leave=False,
+                miniters=0,  # else a quick start of a stage holds the bar back later on
                 bar_format="{desc:<18} {bar:30} {percentage:3.0f} %  {remaining} left",
                 file=sys.stderr,
             )

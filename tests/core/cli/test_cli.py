@@ -121,8 +121,8 @@ def test_that_several_inputs_are_one_cloud(scan_file, detections, tmp_path):
     assert io.info(tmp_path / "report" / "segments.laz").n_points == 4000
 
 
-def test_that_the_number_of_threads_can_be_set(scan_file, detections, tmp_path, monkeypatch):
-    monkeypatch.setattr(parallel, "_n_threads", 2)
+def test_that_the_number_of_threads_can_be_set(scan_file, detections, tmp_path, own_threads):
+    parallel.set_threads(2)
     assert run("detect", scan_file, "-o", tmp_path / "report", "--threads", "1") == 0
     assert parallel.threads() == 1
 

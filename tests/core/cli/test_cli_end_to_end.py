@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipecore import io, parallel
+from pipecore import io
 from pipecore.cli import main
 from pipecore.simulate import Scanner, Scene, save_scene
 from pipecore.simulate.scene import Box, Dent, Run, Straight
@@ -59,8 +59,7 @@ def test_that_a_simulated_dent_is_in_the_report_where_it_was_made(scan_file, tmp
     assert "1 deformation, 1 to reject." in capsys.readouterr().out
 
 
-def test_that_the_number_of_threads_changes_no_digit(scan_file, tmp_path, monkeypatch):
-    monkeypatch.setattr(parallel, "_n_threads", parallel.threads())
+def test_that_the_number_of_threads_changes_no_digit(scan_file, tmp_path, own_threads):
     one = detect(scan_file, tmp_path / "one", "--threads", "1", "--quiet")
     two = detect(scan_file, tmp_path / "two", "--threads", "2", "--quiet")
     for name in ("elements.csv", "profiles.csv", "deformations.csv", "segments.laz"):

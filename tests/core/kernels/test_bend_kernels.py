@@ -5,7 +5,7 @@ import pytest
 
 from pipecore._kernels import bends
 from pipecore.elements.fittings.bends import Corner, pipe_residuals
-from pipecore.elements.fittings.open_ends import _View
+from pipecore.elements.fittings.open_ends import ViewFromEnd
 from pipecore.elements.refinement.surface_fits import LineSurface
 from pipecore.geometry import unit
 
@@ -57,7 +57,7 @@ def test_that_the_best_follower_is_the_first_that_most_points_are_on(rng):
         np.cos(around) * np.cos(angle),
         np.sin(around),
     )
-    view = _View(place, normal)
+    view = ViewFromEnd(place, normal)
     starts, radii, azimuths = np.array([-0.3, 0.0, 0.4]), np.array([1.5, 2.0]), np.arange(0, 6, 0.5)
     count, start, bend_radius, azimuth = view.best_of(starts, radii, azimuths, 0.05)
     on = {

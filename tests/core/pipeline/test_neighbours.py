@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipecore.geometry import ArcAxis, LineAxis
-from pipecore.measurement import _boxes, neighbours_of
+from pipecore.measurement import bounding_boxes, neighbours_of
 from pipecore.types import Element, ElementKind
 from tests.core.shapes import random_direction, random_rotation
 
@@ -22,7 +22,7 @@ def element(rng, i):
 
 def test_that_boxes_leave_out_no_neighbour(rng):
     elements = [element(rng, i) for i in range(60)]
-    boxes = _boxes(elements)
+    boxes = bounding_boxes(elements)
     everything = np.array([[-1e9] * 3] * 60), np.array([[1e9] * 3] * 60), boxes[2]
     n_near = 0
     for e in elements:

@@ -39,7 +39,7 @@ BEYOND, OFF = 3.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
+class ViewFromEnd:
     """Points seen from the end of a straight: along it and across, in its radii."""
 
     place: Array
@@ -113,7 +113,7 @@ def follow_end(
     if near.sum() < MIN_POINTS:
         return None
     rows = sample_evenly(np.flatnonzero(near), MAX_POINTS)
-    view = _View(
+    view = ViewFromEnd(
         np.ascontiguousarray(place[:, rows]),
         np.ascontiguousarray(frame @ nearby.surface.normals[ball[rows]].T),
     )
