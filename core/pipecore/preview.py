@@ -31,14 +31,14 @@ from pipecore.types import PointCloud, Stack
 Array = NDArray[np.float64]
 
 SAMPLE_SIZE = 300_000
-"""About so many points of the cloud are looked at for its stacks."""
-BLOCK = 0.25
+"""About as many points of the cloud are sampled to choose its stacks."""
+BLOCK_SIZE = 0.25
 """Edge of the blocks of space that a sample is made of, metres."""
-EDGE = 0.15
-"""Points this share of a block's edge inside of it are well inside."""
-ENOUGH = 0.3
-"""A sample of less than this share of its size is made anew from more blocks."""
-CHUNK = 2_000_000
+BLOCK_MARGIN = 0.15
+"""Fraction of a block's edge at its sides where points lack neighbours."""
+MIN_SAMPLE_FRACTION = 0.3
+"""A sample of less than this fraction of `SAMPLE_SIZE` is drawn again from more blocks."""
+POINTS_PER_CHUNK = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +184,8 @@ def _surface_of_sample(
 
 def _is_well_inside(xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Whether points lie well inside their blocks, where they have all their neighbours."""
-    place = np.mod(xyz / BLOCK, 1.0)
-    return np.asarray(((place > EDGE) & (place < 1.0 - EDGE)).all(axis=1))
+    place = np.mod(xyz / BLOCK_SIZE, 1.0)
+    return np.asarray(((place > BLOCK_MARGIN) & (place < 1.0 - BLOCK_MARGIN)).all(axis=1))
 
 
 def _plan(stack: Stack, all_xyz: Array, steep_xyz: Array, n_known: int) -> StackPlan:
@@ -221,7 +221,7 @@ def preview_profile(
     slab = cloud.xyz[_slab(cloud, stack, profile_index, margin, progress)]
     n_points = int((stack.profile_index(slab) == profile_index).sum())
     thinning = replace(settings.thinning, voxel_mm=1e3 * plan.voxel)
-    surface = _nothing(plan)
+    surface = _empty_surface(plan)
     if n_points:
         whole = sample_surface(PointCloud(cloud.origin, slab), thinning, progress)
         inside = stack.profile_index(whole.xyz) == profile_index
@@ -242,7 +242,7 @@ def preview_profile(
     return ProfilePreview(stack, profile_index, frame, uv, curve, len(curves), ellipses, n_points)
 
 
-def _nothing(plan: Plan) -> Surface:
+def _empty_surface(plan: Plan) -> Surface:
     nowhere, none = np.empty((0, 3)), np.empty(0)
     return Surface(nowhere, nowhere, none, NOTHING_BEHIND, plan.voxel, plan.noise)
 
@@ -254,7 +254,7 @@ def _slab(
     middle = stack.offset + (profile_index + 0.5) * stack.width
     reach = stack.width / 2 + margin
     found = []
-    for start, stop in in_chunks(len(cloud), CHUNK, "profiles", progress):
+    for start, stop in in_chunks(len(cloud), POINTS_PER_CHUNK, "profiles", progress):
         along = cloud.xyz[start:stop] @ np.asarray(stack.direction, cloud.xyz.dtype)
         found.append(start + np.flatnonzero(np.abs(along - middle) <= reach))
     return np.concatenate(found)
@@ -267,17 +267,17 @@ def _sample(cloud: PointCloud, progress: Progress) -> NDArray[np.intp]:
         limit = np.uint64(min(share, 1.0) * float(2**32))
         found = [
             start + np.flatnonzero(_hash_of_block(cloud.xyz[start:stop]) < limit)
-            for start, stop in in_chunks(len(cloud), CHUNK, "thinning", progress)
+            for start, stop in in_chunks(len(cloud), POINTS_PER_CHUNK, "thinning", progress)
         ]
         index = np.concatenate(found)
-        if share >= 1.0 or len(index) >= ENOUGH * SAMPLE_SIZE:
+        if share >= 1.0 or len(index) >= MIN_SAMPLE_FRACTION * SAMPLE_SIZE:
             return index
         share *= 2
 
 
 def _hash_of_block(xyz: NDArray[np.floating]) -> NDArray[np.uint64]:
     """A number below 2³² for the block that each point lies in."""
-    block = np.floor(xyz / BLOCK).astype(np.int64).astype(np.uint64)
+    block = np.floor(xyz / BLOCK_SIZE).astype(np.int64).astype(np.uint64)
     mixed = block[:, 0] * np.uint64(0x9E3779B97F4A7C15)
     mixed ^= block[:, 1] * np.uint64(0xC2B2AE3D27D4EB4F)
     mixed ^= block[:, 2] * np.uint64(0x165667B19E3779F9)

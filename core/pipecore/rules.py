@@ -106,7 +106,7 @@ class Criterion:
         return Verdict.REVIEW
 
     def __str__(self) -> str:
-        """Return the criterion as a person would say it."""
+        """Return the criterion in words."""
         parts = [", ".join(self.kinds)]
         if self.element_kinds:
             parts.append("on " + ", ".join(KIND_LABELS[k].lower() for k in self.element_kinds))

@@ -3,7 +3,7 @@
 The bump is h·b(ρ) + c over an ellipse, where ρ is the distance from its peak in shares of
 half its length and half its width, and c is what the contour may be off by. Its section
 b is a cosine, cos²(π/2 · ρᑫ), plain for q = 1 and flat-bottomed above, or the frustum of a
-cone whose flat top may be a point. Which of them it is, a scan tells of deep dents only: the
+cone whose flat top may be a point. Only deep dents show which of them it is: the
 depth is the mean of theirs, each weighted by how likely it is (AIC), and that they differ
 is part of its uncertainty. The extents are those of the likeliest.
 Length and width are where the bump has come back to zero, so that a cosine bump of
@@ -20,39 +20,39 @@ from pipecore._kernels import bumps as kernels
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
-MAX_LOOKS, TOLERANCE = 60, 1e-5
-"""A fit ends after so many looks at the points, or where χ² changes by less than this share."""
+MAX_EVALUATIONS, TOLERANCE = 60, 1e-5
+"""A fit ends after so many evaluations, or where χ² changes by less than this fraction."""
 
 MIN_EXTENT, MAX_LENGTH, MAX_WIDTH = 0.1, 3.0, 1.5
 """Bounds of a bump's extents, shares of the outside diameter: beyond, it is no dent."""
 
 TYPICAL_EXTENT, EXTENT_PRIOR = 0.5, 1.0
-"""Extents believed in beforehand (shares of the diameter), and the sd of their logarithms."""
+"""Prior of the extents: typical fraction of the diameter, and the SD of its logarithm."""
 
-CLEAR = 6.0
+FORMS_SIGNIFICANCE = 6.0
 """Significance from which other forms are fitted as well (flat-bottomed, pointed)."""
 
-CORE = 0.75
-"""Where the fit is held against its points: up to this share of the half extents."""
+CORE_EXTENT = 0.75
+"""Residuals are judged up to this fraction of the half extents."""
 
-PEAK, PEAK_POINTS = 0.5, 2
-"""Points within this share of the half extents that have to show how high a bump is."""
+PEAK_EXTENT, MIN_PEAK_POINTS = 0.5, 2
+"""Fraction of the half extents around the peak, and how many points must lie within it."""
 
 HEIGHT_PRIOR = 0.5
-"""Standard deviation of heights believed in beforehand, share of the diameter."""
+"""Prior standard deviation of heights, fraction of the diameter."""
 
-FORM_HANDICAP = 2.0
-"""How much better than a plain cosine another form has to fit."""
+FORM_PENALTY = 2.0
+"""Penalty on the AIC of forms other than the plain cosine."""
 
 ROUNDNESS_PRIOR = 0.5
-"""Weak belief: standard deviation of log(length / width) around 0."""
+"""Weak prior: standard deviation of log(length / width) around 0."""
 
 
 @dataclass(frozen=True)
 class Form:
-    """A family of sections: height at ρ given q, and the sd of log q around 0 believed in.
+    """A family of sections: height at ρ given q, and the prior SD of log q around 0.
 
-    `number` is how the kernels name it.
+    `number` is its code in the kernels.
     """
 
     number: int
@@ -114,9 +114,9 @@ class _Fit:
 
     @property
     def aic(self) -> float:
-        """Akaike's criterion, with the handicap of the less common forms."""
+        """Akaike's criterion, with a penalty on the less common forms."""
         is_plain = self.form is BELL and len(self.parameters) == 6
-        return self.chi2 + 2 * len(self.parameters) + (0.0 if is_plain else FORM_HANDICAP)
+        return self.chi2 + 2 * len(self.parameters) + (0.0 if is_plain else FORM_PENALTY)
 
 
 def fit_bump(
@@ -130,19 +130,27 @@ def fit_bump(
     contour_sd: float,
     inflation: float,
 ) -> Bump | None:
-    """Fit a bump to points (n,) in the plane; None if they do not carry one.
+    """Fit a bump to points in the plane of the unrolled surface.
 
     Parameters
     ----------
-    along, around : ndarray
-        Distances from the supposed peak, metres.
-    deviation, noise : ndarray
+    along, around : ndarray, shape (n,)
+        Distances from the expected peak along the pipe and around it, metres.
+    deviation, noise : ndarray, shape (n,)
         Height above the contour and its standard deviation, metres.
-    start : tuple
-        Height, length and width to start from.
-    diameter, contour_sd : float
+    start : tuple of float
+        Height, length and width to start from, metres.
+    diameter : float
+        Of the pipe, metres.
+    contour_sd : float
+        Standard deviation of the contour's height there, metres.
     inflation : float
-        How much larger the noise of means is than that of points alone would make it.
+        Factor by which correlated noise widens the standard deviation of means.
+
+    Returns
+    -------
+    Bump or None
+        None if the points do not define one within the bounds on its extents.
     """
     height, length, width = start
     first = np.array([height, 0.0, 0.0, np.log(length), np.log(width), 0.0])
@@ -150,7 +158,7 @@ def fit_bump(
         near = (np.abs(along) < 0.8 * length) & (np.abs(around) < 0.8 * width)
         if np.count_nonzero(near) < 8:
             return None
-        data = _thin(along[near], around[near], deviation[near], noise[near] * inflation)
+        data = _binned_means(along[near], around[near], deviation[near], noise[near] * inflation)
         plain = _fit(data, first, diameter, contour_sd)
         first = plain.parameters
         length, width = np.exp(first[3:5])
@@ -159,7 +167,7 @@ def fit_bump(
         if length > MAX_LENGTH * diameter or width > MAX_WIDTH * diameter:
             return None
     fits = [plain]
-    if abs(first[0]) > CLEAR * _height_sd((data[0], data[1], data[3]), length, width):
+    if abs(first[0]) > FORMS_SIGNIFICANCE * _height_sd((data[0], data[1], data[3]), length, width):
         fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd))
         fits.append(_fit(data, first, diameter, contour_sd, CONE))
         fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd, FRUSTUM))
@@ -192,23 +200,23 @@ def fit_bump(
         ),
         n_points=int(np.count_nonzero(inside < 1)),
         volume=float(abs(height) * np.pi / 4 * length * width * best.mean_share),
-        is_peak_seen=bool(np.count_nonzero(inside < PEAK) >= PEAK_POINTS),
+        is_peak_seen=bool(np.count_nonzero(inside < PEAK_EXTENT) >= MIN_PEAK_POINTS),
     )
 
 
 def bump_shape(rho: Array, q: float = 1.0) -> Array:
-    """Values of the cosine bump (1 at the peak, 0 from ρ = 1 on)."""
+    """Return the height of the cosine bump, 1 at the peak and 0 from ρ = 1 on."""
     t = np.minimum(rho, 1.0)
     return np.asarray(np.cos(np.pi / 2 * (t if q == 1.0 else t**q)) ** 2)
 
 
 def cone(rho: Array, _q: float = 1.0) -> Array:
-    """Values of a pointed bump."""
+    """Return the height of a cone, 1 at the peak and 0 from ρ = 1 on."""
     return np.asarray(1.0 - np.minimum(rho, 1.0))
 
 
 def frustum(rho: Array, q: float = 1.0) -> Array:
-    """Values of a bump with straight flanks that is flat up to ρ = q / (1 + q)."""
+    """Return the height of a frustum, flat up to ρ = q / (1 + q) and 0 from ρ = 1 on."""
     return np.asarray(np.clip((1.0 - rho) * (1.0 + q), 0.0, 1.0))
 
 
@@ -222,7 +230,7 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     along, around, deviation, noise = data
     p = fit.parameters
     rho = np.hypot(2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4]))
-    core = rho < CORE
+    core = rho < CORE_EXTENT
     if np.count_nonzero(core) < 3:
         return np.inf
     model = p[0] * fit.form.section(rho, fit.exponent) + p[5]
@@ -249,7 +257,7 @@ def _fit(
     slack = 0.3 * np.exp(first[3:5])
 
     n_free = len(first)
-    # Beliefs are residuals too: (slopes · p - middle).
+    # Priors are residuals too: slopes · p - middle.
     slopes = np.zeros((8, n_free))
     slopes[0, 0] = 1.0 / (HEIGHT_PRIOR * diameter)
     slopes[[1, 2], [1, 2]] = 1.0 / slack
@@ -263,15 +271,15 @@ def _fit(
     p, normal = np.empty(n_free), np.empty((n_free, n_free))
     chi2 = kernels.fit(
         form.number, first, along, around, deviation, noise, slopes, middle,
-        MAX_LOOKS, TOLERANCE, p, normal,
+        MAX_EVALUATIONS, TOLERANCE, p, normal,
     )  # fmt: skip
     return _Fit(p, np.asarray(np.linalg.inv(normal), np.float64), chi2, form)
 
 
-def _thin(
+def _binned_means(
     along: Array, around: Array, deviation: Array, noise: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """Means over a fine mesh where there are more points than the fit needs."""
+    """Weighted means over a fine mesh where there are more points than the fit needs."""
     if len(along) <= MAX_POINTS:
         return along, around, deviation, noise
     mesh = 64

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipecore.deformation.contour import Contour, inner_rows
 from pipecore.deformation.deviation_map import Grid
-from pipecore.deformation.reference import Contour, inner_rows
 from pipecore.geometry import Array
 
 KINK_ADVANTAGE = 20.0

@@ -120,15 +120,15 @@ class DeviationMap:
         Standard deviation of one point there, metres.
     count : ndarray, shape (rows, columns)
         Points of the surface.
-    disputed : ndarray of bool, shape (rows, columns)
-        Cells where another surface touches this one.
+    in_contact : ndarray of bool, shape (rows, columns)
+        Cells where another object touches the surface.
     """
 
     grid: Grid
     deviation: Array
     noise: Array
     count: Array
-    disputed: Flags
+    in_contact: Flags
 
     @cached_property
     def covered(self) -> Flags:
@@ -136,9 +136,9 @@ class DeviationMap:
         return close_holes(self.count > 0)
 
     @cached_property
-    def near_disputed(self) -> Flags:
-        """Cells that are disputed or next to one that is."""
-        return dilate(self.disputed)
+    def near_contact(self) -> Flags:
+        """Cells in contact with another object, and the cells next to them."""
+        return dilate(self.in_contact)
 
 
 def close_holes(cells: Flags) -> Flags:

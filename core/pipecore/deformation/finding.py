@@ -8,19 +8,19 @@ from numpy.typing import NDArray
 
 from pipecore.deformation.bump import Bump
 from pipecore.deformation.centre_line import CENTRE_KNOTS, MIN_BOW_RATIO, measure_centre_line
-from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
-from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
-from pipecore.deformation.patches import Patch, find_patches
-from pipecore.deformation.reference import (
+from pipecore.deformation.contour import (
     KNOT_DIAMETERS,
     Contour,
     fit_contour,
     oval_knot_diameters,
     usable_arc,
 )
+from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
+from pipecore.deformation.element_surface import ElementSurface, find_element_surface
+from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
+from pipecore.deformation.patches import Patch, find_patches
 from pipecore.deformation.strain import dent_strain
-from pipecore.deformation.surface import Surface, own_surface
-from pipecore.deformation.unrolled import Unrolled, surface_distance, unroll
+from pipecore.deformation.unrolled_points import UnrolledPoints, surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.reasons import Reason
 from pipecore.settings import DeformationSettings
@@ -37,8 +37,8 @@ MIN_DEPTH_SD = 3.0
 """A depth has to be this many times its standard deviation."""
 
 MIN_DENT_ARC = np.deg2rad(100.0)
-MAX_UNTOLD = 0.2
-"""Where less arc is seen, the contour follows a dent; told of an element if a fifth is so."""
+MAX_SHORT_ARC = 0.2
+"""Where less arc is seen, the contour follows a dent; reported from this fraction of the length."""
 
 MIN_BOW_LENGTH = 6.0
 """In diameters: the line of a shorter stub hangs on what touches it."""
@@ -62,7 +62,7 @@ class DeformationFinding:
         Signed distance of every point from the undeformed contour, metres, outward
         positive; nan for points that are not of the surface.
     belongs : ndarray of bool, shape (n,)
-    points : Unrolled
+    points : UnrolledPoints
         All n points in the coordinates of the element.
     map : DeviationMap, optional
         None where there are too few points.
@@ -77,7 +77,7 @@ class DeformationFinding:
     deformations: tuple[Deformation, ...]
     deviation: NDArray[np.float32]
     belongs: Flags
-    points: Unrolled
+    points: UnrolledPoints
     map: DeviationMap | None
     ovality: float = np.nan
     ovality_sd: float = np.nan
@@ -105,7 +105,7 @@ def find_deformations(
     settings : DeformationSettings
     """
     points = unroll(element, xyz, normals)
-    surface = own_surface(element, points)
+    surface = find_element_surface(element, points)
     if surface is None:
         return DeformationFinding(
             (),
@@ -154,15 +154,17 @@ def find_deformations(
         deformations = [d for d in deformations if not _is_of_kink(d, bow, surface.grid)] + bow
 
     deviation = np.full(len(xyz), np.nan, np.float32)
-    own = surface.belongs
-    at_point = surface.grid.interpolate(contour.height, points.chainage[own], points.clock[own])
-    deviation[own] = points.height[own] - at_point
+    inliers = surface.belongs
+    at_point = surface.grid.interpolate(
+        contour.height, points.chainage[inliers], points.clock[inliers]
+    )
+    deviation[inliers] = points.height[inliers] - at_point
     if element.kind not in SEARCHED:
         deformations = []
     return DeformationFinding(
         tuple(sorted(deformations, key=lambda d: (d.chainage, d.kind))),
         deviation,
-        own,
+        inliers,
         points,
         replace(heights, deviation=heights.deviation - contour.height),
         ovality,
@@ -197,7 +199,7 @@ def _arc_at(heights: DeviationMap, patch: Patch) -> float:
 def _why_no_dents(heights: DeviationMap) -> Reason:
     """Why dents are not measurable along a good part of an element; empty if they are."""
     short = float(np.mean(_arcs(heights) < MIN_DENT_ARC))
-    if short < MAX_UNTOLD:
+    if short < MAX_SHORT_ARC:
         return NO_REASON
     return Reason(
         "less than {needed}° of arc seen over {share} % of the length",
@@ -229,12 +231,14 @@ def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, Reason]:
     return ovality, sd, NO_REASON
 
 
-def _height_map(element: Element, surface: Surface, neighbours: Sequence[Element]) -> DeviationMap:
+def _height_map(
+    element: Element, surface: ElementSurface, neighbours: Sequence[Element]
+) -> DeviationMap:
     """Cell means above the fitted surface, with the cells where others touch it."""
-    grid, own = surface.grid, surface.belongs
-    cell = surface.cell[own]
+    grid, inliers = surface.grid, surface.belongs
+    cell = surface.cell[inliers]
     count = grid.count(cell)
-    disputed = surface.foreign.copy()
+    in_contact = surface.overlain.copy()
     if neighbours:
         chainage, clock = (
             a.ravel() for a in np.meshgrid(grid.chainages, grid.clocks, indexing="ij")
@@ -242,15 +246,15 @@ def _height_map(element: Element, surface: Surface, neighbours: Sequence[Element
         places = surface_points(element.axis, chainage, element.radius_at(chainage), clock)
         reach = max(2 * grid.row_size, 0.01)
         for other in neighbours:
-            disputed |= (surface_distance(other, places) < reach).reshape(grid.shape)
+            in_contact |= (surface_distance(other, places) < reach).reshape(grid.shape)
     return DeviationMap(
-        grid, grid.mean(cell, surface.points.height[own]), surface.noise, count, disputed
+        grid, grid.mean(cell, surface.points.height[inliers]), surface.noise, count, in_contact
     )
 
 
 def _as_deformation(
     element: Element,
-    surface: Surface,
+    surface: ElementSurface,
     contour: Contour,
     patch: Patch,
     settings: DeformationSettings,
@@ -328,7 +332,7 @@ def _is_of_kink(found: Deformation, bow: list[Deformation], grid: Grid) -> bool:
 
 
 def _oval_deformation(
-    element: Element, surface: Surface, contour: Contour, oval: OvalStretch
+    element: Element, surface: ElementSurface, contour: Contour, oval: OvalStretch
 ) -> Deformation:
     """An oval stretch; its depth is how far the section leaves the circle."""
     grid = surface.grid
@@ -355,7 +359,7 @@ def _oval_deformation(
 
 def _measure_bow(
     element: Element,
-    surface: Surface,
+    surface: ElementSurface,
     heights: DeviationMap,
     patches: list[Patch],
     *,

@@ -1,6 +1,6 @@
 """Where the map leaves the contour by more than its noise: a matched filter of bump sizes.
 
-A smooth bump of extents L × W is looked for at every cell. With weights w (inverse
+A smooth bump of extents L × W is fitted at every cell. With weights w (inverse
 variances of the cell means) and a bump shape k, its height there and its variance are
 
     h = Σ k w d / Σ k² w,    var h = 1 / Σ k² w + var(contour),
@@ -17,7 +17,7 @@ from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 
 EXTENTS = (0.18, 0.25, 0.35, 0.5, 0.7, 1.0)
-"""Extents of the bumps looked for, shares of the outside diameter."""
+"""Extents of the bumps searched for, fractions of the outside diameter."""
 
 MIN_POINTS = 5
 """Fewer points than this under a bump are no evidence, however far off they lie."""
@@ -41,7 +41,7 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class MatchedFilter:
-    """The filter of a map: what its bumps of each extent meet, whatever the contour is.
+    """Matched filters of several extents for one deviation map, independent of the contour.
 
     Parameters
     ----------
@@ -50,25 +50,25 @@ class MatchedFilter:
         Inverse variances of the cell means, 0 where empty.
     allowed : ndarray of bool, shape (rows, columns)
         Cells where a peak may lie.
-    layers : tuple of Layer
+    filters : tuple of SizeFilter
     """
 
     grid: Grid
     weight: Array
     allowed: Flags
-    layers: tuple["Layer", ...]
+    filters: tuple["SizeFilter", ...]
 
     @classmethod
     def of(cls, grid: Grid, weight: Array, count: Array, allowed: Flags) -> "MatchedFilter":
-        """Return that of a map with so many points in its cells."""
+        """Return the filters for a map with the given weights and point counts."""
         sizes = np.array(EXTENTS) * 2 * grid.radius
         wide = sizes[sizes >= 2.5 * max(grid.row_size, grid.column_size)]
         return cls(
-            grid, weight, allowed, tuple(Layer.of(grid, weight, count, size) for size in wide)
+            grid, weight, allowed, tuple(SizeFilter.of(grid, weight, count, size) for size in wide)
         )
 
     def find(self, deviation: Array, contour_sd: Array, threshold: float) -> list[Candidate]:
-        """Return bumps and dents above `threshold` times their noise, strongest first.
+        """Find bumps and dents above `threshold` times their noise, strongest first.
 
         Parameters
         ----------
@@ -77,15 +77,20 @@ class MatchedFilter:
         threshold : float
         """
         grid = self.grid
-        pull = self.weight * np.nan_to_num(deviation)
+        weighted = self.weight * np.nan_to_num(deviation)
         heights, scores, inflations = [], [], []
-        for layer in self.layers:
+        for size_filter in self.filters:
             height, z = np.empty(grid.shape), np.empty(grid.shape)
-            kernels.correlate(pull, layer.along, layer.around, height)
+            kernels.correlate(weighted, size_filter.along, size_filter.around, height)
             spread = kernels.score(
-                height, layer.precision, layer.is_told, contour_sd, self.allowed, z
+                height,
+                size_filter.precision,
+                size_filter.is_measurable,
+                contour_sd,
+                self.allowed,
+                z,
             )
-            # Noise that neighbours share shows as a spread of z above one.
+            # Correlated noise widens the distribution of z.
             inflations.append(max(1.0, spread))
             heights.append(height)
             scores.append(z)
@@ -102,7 +107,7 @@ class MatchedFilter:
             score = float(scores[best][row, column] / inflations[best])
             if not free[row, column] or abs(score) < threshold:
                 break
-            size = self.layers[best].size
+            size = self.filters[best].size
             found.append(
                 Candidate(
                     float(grid.chainages[row]),
@@ -119,8 +124,8 @@ class MatchedFilter:
 
 
 @dataclass(frozen=True, eq=False)
-class Layer:
-    """What bumps of one extent meet at every cell.
+class SizeFilter:
+    """Matched filter for bumps of one extent at every cell.
 
     Parameters
     ----------
@@ -130,19 +135,19 @@ class Layer:
         The bump along the pipe and around it, by cells.
     precision : ndarray, shape (rows, columns)
         Inverse variance of a height there.
-    is_told : ndarray of bool, shape (rows, columns)
-        Whether there are points enough under a bump.
+    is_measurable : ndarray of bool, shape (rows, columns)
+        Whether at least `MIN_POINTS` points lie under a bump there.
     """
 
     size: float
     along: Array
     around: Array
     precision: Array
-    is_told: Flags
+    is_measurable: Flags
 
     @classmethod
-    def of(cls, grid: Grid, weight: Array, count: Array, size: float) -> "Layer":
-        """Return that of bumps `size` metres wide."""
+    def of(cls, grid: Grid, weight: Array, count: Array, size: float) -> "SizeFilter":
+        """Return the filter for bumps `size` metres wide."""
         along, around = _bell(size, grid.row_size), _bell(size, grid.column_size)
         precision, points = np.empty(grid.shape), np.empty(grid.shape)
         kernels.correlate(weight, along**2, around**2, precision)
@@ -152,7 +157,20 @@ class Layer:
 
 
 def disc(grid: Grid, chainage: float, clock: float, length: float, width: float) -> Flags:
-    """Cells within an ellipse of full axes `length` and `width`."""
+    """Return the cells within an ellipse on the surface.
+
+    Parameters
+    ----------
+    grid : Grid
+    chainage, clock : float
+        Its centre, metres and radians.
+    length, width : float
+        Its full axes along the pipe and around it, metres.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows, columns)
+    """
     cells = np.zeros(grid.shape, dtype=bool)
     rows = grid.rows_near(chainage, length / 2)
     along = (grid.chainages[rows] - chainage) / (length / 2)

@@ -111,11 +111,15 @@ def mesh_elements(
     meshes = []
     for element_id in element_ids:
         element = result.element(element_id)
-        own = result.element_id == element_id
-        xyz = cloud.xyz[own].astype(np.float64)
+        inliers = result.element_id == element_id
+        xyz = cloud.xyz[inliers].astype(np.float64)
         meshes.append(
             mesh_surface(
-                element, xyz, result.deviation[own], exaggeration=exaggeration, name=element.label
+                element,
+                xyz,
+                result.deviation[inliers],
+                exaggeration=exaggeration,
+                name=element.label,
             )
         )
     return meshes
@@ -146,14 +150,19 @@ def mesh_deformations(
     meshes = []
     for d in chosen:
         element = result.element(d.element_id)
-        own = result.element_id == d.element_id
-        xyz = cloud.xyz[own].astype(np.float64)
+        inliers = result.element_id == d.element_id
+        xyz = cloud.xyz[inliers].astype(np.float64)
         margin = MARGIN * 2 * float(element.radius_at(d.chainage))
         stretch = (d.chainage_start - margin, d.chainage_end + margin)
         name = f"{d.kind} {d.deformation_id} on {element.label}"
         meshes.append(
             mesh_surface(
-                element, xyz, result.deviation[own], stretch, exaggeration=exaggeration, name=name
+                element,
+                xyz,
+                result.deviation[inliers],
+                stretch,
+                exaggeration=exaggeration,
+                name=name,
             )
         )
     return meshes

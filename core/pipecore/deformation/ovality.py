@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.deformation.reference import Contour
+from pipecore.deformation.contour import Contour
 from pipecore.geometry import Array
 
 MIN_ARC = np.deg2rad(200.0)
-"""Below this the second harmonic cannot be told from a shift of the centre."""
+"""Below this the second harmonic cannot be separated from a shift of the centre."""
 
-CLEAR = 6.0
+MIN_SIGNIFICANCE = 6.0
 """A stretch is oval if its ovality is this many times its standard deviation."""
 
 
@@ -32,9 +32,20 @@ class OvalStretch:
 
 
 def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
-    """Ovality (ratio), its standard deviation and the clock of the widest place, per row.
+    """Return the ovality of every row of a contour.
 
-    The noise alone gives a positive amplitude; what it adds on average is taken off.
+    Noise alone gives a positive amplitude; its mean contribution is subtracted.
+
+    Parameters
+    ----------
+    contour : Contour
+        Fitted with five terms.
+
+    Returns
+    -------
+    ovality, ovality_sd, clock : ndarray, shape (rows,)
+        Ratios (Dmax - Dmin) / Dnom with their standard deviations, and the clock angle of the
+        largest diameter, radians.
     """
     a2, b2 = contour.terms[:, 3], contour.terms[:, 4]
     variance = np.trace(contour.term_covariance[:, 3:5, 3:5], axis1=1, axis2=2) / 2
@@ -45,10 +56,10 @@ def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
 
 
 def mean_ovality(contour: Contour) -> tuple[float, float]:
-    """Ovality of the mean section of the element and its standard deviation, ratios."""
-    pull = contour.basis.mean
-    mean = (pull @ contour.coefficients)[3:5]
-    covariance = np.einsum("a,akbl,b->kl", pull, contour.covariance, pull)[3:5, 3:5]
+    """Return the ovality of an element's mean section and its standard deviation, ratios."""
+    weights = contour.basis.mean
+    mean = (weights @ contour.coefficients)[3:5]
+    covariance = np.einsum("a,akbl,b->kl", weights, contour.covariance, weights)[3:5, 3:5]
     variance = float(np.trace(covariance)) / 2
     amplitude = np.sqrt(max(float(mean @ mean) - variance, 0.0))
     to_ratio = 2.0 / contour.grid.radius
@@ -62,11 +73,11 @@ def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
     """
     ovality, sd, clock = ovality_along(contour)
     found = []
-    for first, last in runs((ovality > 0.5 * min_ovality) & (sd < min_ovality)):
+    for first, last in true_ranges((ovality > 0.5 * min_ovality) & (sd < min_ovality)):
         peak = first + int(np.argmax(ovality[first : last + 1]))
         long_enough = (last + 1 - first) * contour.grid.row_size >= 2 * contour.grid.radius
-        clear = ovality[peak] > max(CLEAR * sd[peak], min_ovality)
-        if long_enough and clear:
+        is_clear = ovality[peak] > max(MIN_SIGNIFICANCE * sd[peak], min_ovality)
+        if long_enough and is_clear:
             # The strongest value of many reads high: the stretch's upper quarter is its ovality.
             strong = first + np.flatnonzero(
                 ovality[first : last + 1] >= np.quantile(ovality[first : last + 1], 0.75)
@@ -86,8 +97,8 @@ def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
     return found
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each run of true values."""
+def true_ranges(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first and last index of each unbroken sequence of true values."""
     edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
     return list(
         zip(

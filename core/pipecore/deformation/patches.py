@@ -5,33 +5,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipecore.deformation.bump import TYPICAL_EXTENT, Bump, fit_bump
+from pipecore.deformation.contour import Contour, fit_contour
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
+from pipecore.deformation.element_surface import ElementSurface
 from pipecore.deformation.matched_filter import Candidate, MatchedFilter, disc
-from pipecore.deformation.reference import Contour, fit_contour
-from pipecore.deformation.surface import Surface
-from pipecore.deformation.unrolled import least_stretch, stretch
+from pipecore.deformation.unrolled_points import min_stretch, stretch
 from pipecore.geometry import Array
 from pipecore.types import Element
 
-MASK = 1.2
-"""The contour is fitted without the bumps, this much larger than the filter that saw them."""
+MASK_SCALE = 1.2
+"""Bumps are masked in the fit of the contour, this much larger than their filter's extent."""
 
-MASKED_FROM = 0.7
-"""Share of the significance from which the contour does without a place."""
+MASK_SIGNIFICANCE = 0.7
+"""Fraction of the required significance from which a place is masked."""
 
 N_ROUNDS = 2
 
 MIN_POINTS = 8
 """A bump of six parameters needs more points than that."""
 
-RETURN = 0.4
-"""Beyond a bump, the surface is back if it is closer to the contour than this share of it."""
+MAX_REMAINDER = 0.4
+"""Beyond a bump, the surface has returned if it deviates by less than this fraction of it."""
 
 BULGE_FACTOR = 1.1
-"""A bulge has to be this much more significant than a dent: what touches a pipe looks like one."""
+"""Factor on the significance of bulges, as objects that touch a pipe look like one."""
 
 MAX_MISFIT = 1.8
-"""A bulge whose points lie further from its fit (in units of noise) is two surfaces."""
+"""Largest RMS residual of a bulge, in units of the noise: beyond, it is two surfaces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class Patch:
 
 def find_patches(
     element: Element,
-    surface: Surface,
+    surface: ElementSurface,
     cells: DeviationMap,
     significance: float,
     *,
@@ -88,7 +88,7 @@ def find_patches(
     some = cells.count > 0
     variance = np.where(some, cells.noise**2 / np.maximum(cells.count, 1), np.inf)
     weight = np.divide(cells.count, cells.noise**2, where=some, out=np.zeros(grid.shape))
-    allowed = cells.covered & ~cells.disputed
+    allowed = cells.covered & ~cells.in_contact
     bumps = MatchedFilter.of(grid, weight, cells.count, allowed)
 
     masked = np.zeros(grid.shape, dtype=bool)
@@ -101,10 +101,12 @@ def find_patches(
             knot_diameters=knot_diameters,
         )
         deviation = cells.deviation - contour.height
-        found = bumps.find(deviation, contour.sd, MASKED_FROM * significance)
+        found = bumps.find(deviation, contour.sd, MASK_SIGNIFICANCE * significance)
         before, masked = masked, np.zeros(grid.shape, dtype=bool)
         for seen in found:
-            masked |= disc(grid, seen.chainage, seen.clock, MASK * seen.length, MASK * seen.width)
+            masked |= disc(
+                grid, seen.chainage, seen.clock, MASK_SCALE * seen.length, MASK_SCALE * seen.width
+            )
         if n_masks == N_ROUNDS or np.array_equal(masked, before):
             break  # The same mask leads to the same contour.
     patches = []
@@ -119,7 +121,7 @@ def find_patches(
 
 def _measure(
     element: Element,
-    surface: Surface,
+    surface: ElementSurface,
     cells: DeviationMap,
     contour: Contour,
     seen: Candidate,
@@ -128,7 +130,7 @@ def _measure(
     reach = 2.5 * max(seen.length, seen.width)
     scale = float(stretch(element, seen.clock))
     radius = float(element.radius_at(seen.chainage))
-    near = surface.own_near(seen.chainage, reach / least_stretch(element))
+    near = surface.points_near(seen.chainage, reach / min_stretch(element))
     along = (points.chainage[near] - seen.chainage) * stretch(element, points.clock[near])
     turn = np.mod(points.clock[near] - seen.clock + np.pi, 2 * np.pi) - np.pi
     close = (np.abs(along) < reach) & (np.abs(turn) * radius < reach)
@@ -183,7 +185,7 @@ def _shares(
 
 
 def _sides(u: Array, v: Array) -> tuple[Flags, ...]:
-    """Cells ahead, behind, to the right and to the left of a place."""
+    """Cells beyond a place, before it, to its right and to its left."""
     return u > np.abs(v), u < -np.abs(v), v > np.abs(u), v < -np.abs(u)
 
 
@@ -212,7 +214,7 @@ def _returns(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
         if weight.sum() > 0:
             mean = float(np.average(deviation[rows][there], weights=weight))
             least = 2.5 / np.sqrt(weight.sum())
-            n_back += abs(mean) < max(RETURN * abs(patch.bump.height), least)
+            n_back += abs(mean) < max(MAX_REMAINDER * abs(patch.bump.height), least)
     return n_back
 
 
@@ -220,7 +222,7 @@ def _seen_sides(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
     """On how many sides a bump is seen to come back to the contour, 0 if it is no bump.
 
     A dent may be cut off on one side by the edge of what was scanned. A bulge may not,
-    nor have another surface near: things that touch a pipe look like that.
+    nor have another surface near: objects that touch a pipe look like that.
     """
     bump = patch.bump
     if not 0 < patch.chainage < cells.grid.length or bump.n_points < MIN_POINTS:
@@ -232,9 +234,9 @@ def _seen_sides(cells: DeviationMap, deviation: Array, patch: Patch) -> int:
         return 0
     n_closed = min(_closed_sides(cells, patch.place), _returns(cells, deviation, patch))
     if bump.height > 0:
-        disputed = np.count_nonzero(cells.near_disputed[rows] & inside)
-        is_own = disputed < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
-        return n_closed if is_own else 0
+        n_contact = np.count_nonzero(cells.near_contact[rows] & inside)
+        is_free = n_contact < 0.1 * int(np.count_nonzero(inside)) and bump.misfit < MAX_MISFIT
+        return n_closed if is_free else 0
     return n_closed
 
 

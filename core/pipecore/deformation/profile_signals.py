@@ -13,8 +13,8 @@ from pipecore.deformation import section_curve
 from pipecore.geometry import Array
 from pipecore.types import Element, Profiles
 
-AT_ONCE = 200
-"""Profiles between two looks for a cancel: some hundredths of a second."""
+PROFILES_PER_CHECK = 200
+"""Profiles between two checks for a cancel: some hundredths of a second."""
 
 
 def curvature_variations(
@@ -54,8 +54,8 @@ def curvature_variations(
     middle = np.asarray((index + 0.5) * width, np.float64)
     rho = rho + (element.radius_at(middle) - element.radius_at(chainage[order]))
     first, last = starts[profiles.profile_index], starts[profiles.profile_index + 1]
-    for start in range(0, len(variation), AT_ONCE):
+    for start in range(0, len(variation), PROFILES_PER_CHECK):
         check()
-        rows = slice(start, start + AT_ONCE)
+        rows = slice(start, start + PROFILES_PER_CHECK)
         variation[rows] = section_curve.curvature_variations(clock, rho, first[rows], last[rows])
     return variation

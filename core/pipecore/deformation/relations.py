@@ -105,8 +105,8 @@ def _related(
     deformation: Deformation, run: RunLinks, deformations: Sequence[Deformation]
 ) -> Deformation:
     number = {e.element_id: i for i, e in enumerate(run.elements)}
-    own = number[deformation.element_id]
-    distance, arrival = run.reached_from(own, deformation.chainage)
+    index = number[deformation.element_id]
+    distance, arrival = run.reached_from(index, deformation.chainage)
     fittings = [i for i, e in enumerate(run.elements) if e.kind in FITTINGS]
     related = deformation
     if fittings:
@@ -124,13 +124,13 @@ def _related(
         if d is not deformation and d.kind in PATCHES and d.element_id in number
     ]
     gaps = [
-        (_gap((run.elements[own], deformation), (run.elements[i], d), distance[i], arrival[i]), d)
+        (_gap((run.elements[index], deformation), (run.elements[i], d), distance[i], arrival[i]), d)
         for i, d in others
     ]
     if not gaps:
         return related
     gap, other = min(gaps, key=lambda pair: (pair[0], pair[1].deformation_id))
-    diameter = 2 * float(run.elements[own].radius_at(deformation.chainage))
+    diameter = 2 * float(run.elements[index].radius_at(deformation.chainage))
     return replace(
         related,
         next_id=other.deformation_id,
@@ -140,8 +140,8 @@ def _related(
 
 
 def _gap(
-    own: tuple[Element, Deformation],
-    other: tuple[Element, Deformation],
+    first: tuple[Element, Deformation],
+    second: tuple[Element, Deformation],
     distance: float,
     arrival: float,
 ) -> float:
@@ -149,19 +149,19 @@ def _gap(
 
     `distance` leads along the run to the other's element and `arrival` is where it does.
     """
-    element, deformation = own
+    element, deformation = first
     radius = float(element.radius_at(deformation.chainage))
-    if element is other[0]:
-        along, clock = abs(deformation.chainage - other[1].chainage), other[1].clock
+    if element is second[0]:
+        along, clock = abs(deformation.chainage - second[1].chainage), second[1].clock
     else:
-        along = distance + abs(other[1].chainage - arrival)
+        along = distance + abs(second[1].chainage - arrival)
         # Beyond a bend clock positions cannot be compared: then the sides count as one.
         clock = deformation.clock
-        if _on_one_line(element, other[0]):
-            clock = float(element.axis.pipe_coordinates(other[1].peak[None])[2][0])
+        if _on_one_line(element, second[0]):
+            clock = float(element.axis.pipe_coordinates(second[1].peak[None])[2][0])
     turn = abs(np.mod(deformation.clock - clock + np.pi, 2 * np.pi) - np.pi)
     apart = float(np.hypot(along, turn * radius))
-    reach = sum(_reach(d, along, turn * radius) for d in (deformation, other[1]))
+    reach = sum(_reach(d, along, turn * radius) for d in (deformation, second[1]))
     return max(apart - reach, 0.0)
 
 

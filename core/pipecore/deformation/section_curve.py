@@ -148,7 +148,7 @@ def fit_section(
 ) -> SectionCurve | NoFit:
     """Fit a smooth curve to the points of a section.
 
-    Points far off the curve, as Tukey's weights at the highest order tell them, are left out.
+    Points far off the curve, by Tukey's weights at the highest order, are left out.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def fit_section(
     Returns
     -------
     SectionCurve or NoFit
-        `NoFit`, which is false, tells why the points carry no curve.
+        `NoFit`, which is false and gives the reason, where the points do not define a curve.
     """
     theta = np.mod(np.asarray(clock, dtype=np.float64), 2 * np.pi)
     r = np.asarray(rho, dtype=np.float64)

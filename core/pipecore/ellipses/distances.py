@@ -45,11 +45,11 @@ def orthogonal_distances(points: Array, parameters: Array) -> tuple[Array, Array
     axes = np.array([mean + half_difference, mean - half_difference])
     # A trial step may turn an axis round: the curve is the same with its length positive.
     lengths = np.maximum(np.abs(axes), 1e-9)
-    own = (points - parameters[:2]) @ turn
-    on_circle = _foot_on_circle(np.abs(own), lengths) * np.where(own < 0, -1.0, 1.0)
+    local = (points - parameters[:2]) @ turn
+    on_circle = _foot_on_circle(np.abs(local), lengths) * np.where(local < 0, -1.0, 1.0)
     normal = on_circle / lengths
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    distance = ((own - on_circle * lengths) * normal).sum(axis=1)
+    distance = ((local - on_circle * lengths) * normal).sum(axis=1)
     (ux, uy), (nx, ny) = turn @ (on_circle * np.sign(axes)).T, turn @ normal.T
     jacobian = -np.column_stack([nx, ny, nx * ux + ny * uy, nx * ux - ny * uy, nx * uy + ny * ux])
     return distance, jacobian

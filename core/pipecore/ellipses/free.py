@@ -50,9 +50,9 @@ def fit_free_ellipses(
         if len(wanted) == 0:
             return found
         sizes = np.diff(starts)[wanted]
-        own_starts = np.concatenate([[0], np.cumsum(sizes)])
-        rows = np.arange(own_starts[-1]) + np.repeat(starts[wanted] - own_starts[:-1], sizes)
-        direct = fit_direct_ellipses(points[rows], own_starts)
+        wanted_starts = np.concatenate([[0], np.cumsum(sizes)])
+        rows = np.arange(wanted_starts[-1]) + np.repeat(starts[wanted] - wanted_starts[:-1], sizes)
+        direct = fit_direct_ellipses(points[rows], wanted_starts)
         found.centre[wanted] = direct.centre
         for name in _NUMBERS:
             getattr(found, name)[wanted] = getattr(direct, name)

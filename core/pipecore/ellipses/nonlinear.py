@@ -26,8 +26,8 @@ Model = Callable[[Array, Array], tuple[Array, Array]]
 
 SAMPLE_SIZE, N_SAMPLES = 6, 300
 """Random samples of the robust fit: with 40 % outliers, 14 of 300 are clean on average."""
-N_JUDGES = 500
-"""About as many points judge the samples."""
+N_TEST_POINTS = 500
+"""About as many points rate the samples."""
 TUKEY_REACH = 4.685
 """In standard deviations: 95 % as efficient as least squares where there are no outliers."""
 MAX_CONDITION = 1e8
@@ -166,8 +166,8 @@ def fit_nonlinear_ellipse(
     model = orthogonal_distances if distance is Distance.ORTHOGONAL else radial_distances
     fit = (_reweighted if robust else _least_squares)(model, scaled, first)
     if fit is None:
-        return NoFit(Reason("The points do not tell an ellipse from a parabola."))
-    return _judge(fit, middle, scale, max_sd_share)
+        return NoFit(Reason("The points do not separate an ellipse from a parabola."))
+    return _in_units(fit, middle, scale, max_sd_share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,8 +182,8 @@ class _Fit:
     condition: float
 
 
-def _judge(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> FittedEllipse | NoFit:
-    """The fit in the points' own units, if they determine it."""
+def _in_units(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> FittedEllipse | NoFit:
+    """The fit in the units of the points, or why they do not determine it."""
     x, y, mean, cos_part, sin_part = scale * fit.parameters
     half_difference = float(np.hypot(cos_part, sin_part))
     ellipse = FittedEllipse(
@@ -200,7 +200,7 @@ def _judge(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> Fitte
         ellipse.semi_minor < (1 - MAX_FLATTENING) * ellipse.semi_major
         or ellipse.semi_major > MAX_REACH * scale
     ):
-        return NoFit(Reason("The points do not tell an ellipse from a line or a parabola."))
+        return NoFit(Reason("The points do not separate an ellipse from a line or a parabola."))
     if fit.condition > MAX_CONDITION:
         return NoFit(Reason("The points do not determine all five parameters of an ellipse."))
     if ellipse.semi_minor_sd > max_sd_share * ellipse.semi_minor:
@@ -246,8 +246,8 @@ def _best_of_samples(points: Array) -> Array | None:
     table = table[np.isfinite(table).all(axis=1)]
     if len(table) == 0:
         return _direct(points)
-    judges = ordered[:: max(1, len(points) // N_JUDGES)]
-    x, y = (judges[:, None, i] - table[:, i] for i in (0, 1))
+    tested = ordered[:: max(1, len(points) // N_TEST_POINTS)]
+    x, y = (tested[:, None, i] - table[:, i] for i in (0, 1))
     cos, sin = np.cos(table[:, 4]), np.sin(table[:, 4])
     stretch = np.hypot((cos * x + sin * y) / table[:, 2], (cos * y - sin * x) / table[:, 3])
     off = np.abs(np.hypot(x, y) * (1 - 1 / np.maximum(stretch, 1e-9)))

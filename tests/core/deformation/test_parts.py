@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from pipecore.deformation.bump import bump_shape, cone, fit_bump, frustum
+from pipecore.deformation.contour import fit_contour
 from pipecore.deformation.deviation_map import Grid, close_holes, group_median
 from pipecore.deformation.matched_filter import MatchedFilter
-from pipecore.deformation.ovality import runs
-from pipecore.deformation.reference import fit_contour
+from pipecore.deformation.ovality import true_ranges
 from pipecore.deformation.strain import dent_strain
 
 
@@ -138,7 +138,7 @@ def test_that_small_holes_are_closed_and_large_ones_are_not():
 
 def test_that_runs_are_told_apart():
     flags = np.array([1, 1, 0, 1, 0, 0, 1], bool)
-    assert runs(flags) == [(0, 1), (3, 3), (6, 6)]
+    assert true_ranges(flags) == [(0, 1), (3, 3), (6, 6)]
 
 
 def test_that_strain_follows_its_parts():

@@ -1,4 +1,4 @@
-"""Which of the points around an element lie on its own surface."""
+"""Separation of the points on an element's surface from everything else around it."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from pipecore.deformation.contour import fit_contour
 from pipecore.deformation.deviation_map import (
     Flags,
     Grid,
@@ -15,13 +16,15 @@ from pipecore.deformation.deviation_map import (
     local_noise,
     point_spacing,
 )
-from pipecore.deformation.reference import fit_contour
-from pipecore.deformation.unrolled import Unrolled
+from pipecore.deformation.unrolled_points import UnrolledPoints
 from pipecore.geometry import Array
 from pipecore.types import Element
 
+MIN_POINTS = 30
+"""Fewer points near the contour do not define an element's surface."""
+
 INWARD_REACH, OUTWARD_REACH = 0.5, 0.25
-"""How far from the contour deformations are looked for, shares of the radius."""
+"""Distance from the contour up to which deformations are searched, fractions of the radius."""
 
 MIN_ALIGNMENT = np.cos(np.deg2rad(50.0))
 """The flank of the steepest dent (35°) with a noisy normal (5°, three times)."""
@@ -30,29 +33,30 @@ STEEPEST_FLANK = np.tan(np.deg2rad(35.0))
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """The own surface of an element within its neighbourhood.
+class ElementSurface:
+    """The surface of an element as found among the points around it.
 
     Parameters
     ----------
     grid : Grid
-    points : Unrolled
+    points : UnrolledPoints
         All the points of the neighbourhood, n of them.
     belongs : ndarray of bool, shape (n,)
+        Points on the element's surface.
     cell : ndarray of int, shape (n,)
         Flat index of each point's cell.
     noise : ndarray, shape (rows, columns)
         Standard deviation of one point, metres.
-    foreign : ndarray of bool, shape (rows, columns)
-        Cells where points of something else lie close over the surface.
+    overlain : ndarray of bool, shape (rows, columns)
+        Cells where points of another object lie close above the surface.
     """
 
     grid: Grid
-    points: Unrolled
+    points: UnrolledPoints
     belongs: Flags
     cell: np.ndarray
     noise: Array
-    foreign: Flags
+    overlain: Flags
 
     @cached_property
     def _row(self) -> NDArray[np.int32]:
@@ -60,18 +64,29 @@ class Surface:
         row = np.where(self.belongs, self.cell // self.grid.n_columns, -1)
         return row.astype(np.int32)
 
-    def own_near(self, chainage: float, reach: float) -> NDArray[np.intp]:
-        """Points that belong, in rows that may hold some within reach of a chainage."""
+    def points_near(self, chainage: float, reach: float) -> NDArray[np.intp]:
+        """Indices of the surface's points in the rows within `reach` metres of a chainage."""
         rows = self.grid.rows_near(chainage, reach + self.grid.row_size)
         return np.flatnonzero((self._row >= rows.start) & (self._row < rows.stop))
 
 
-def own_surface(element: Element, points: Unrolled) -> Surface | None:
-    """Find the points on an element's surface; None if there are too few to say.
+def find_element_surface(element: Element, points: UnrolledPoints) -> ElementSurface | None:
+    """Find the points on an element's surface by region growing.
 
     It starts from cells at the robustly fitted contour and grows into neighbouring
-    cells as long as the surface goes on without a step: down into dents and up
-    bulges, but not over to things that merely stand near.
+    cells as long as the surface continues without a step: into dents and over
+    bulges, but not onto objects nearby.
+
+    Parameters
+    ----------
+    element : Element
+    points : UnrolledPoints
+        All points of its neighbourhood.
+
+    Returns
+    -------
+    ElementSurface or None
+        None where fewer than `MIN_POINTS` points lie near the contour.
     """
     radius = (element.radius + element.radius_end) / 2
     length = element.axis.length
@@ -80,7 +95,7 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     facing = near & ~(points.alignment < MIN_ALIGNMENT)
     band = max(4 * min(element.rms, 0.03 * radius), 0.02 * radius)
     core = facing & (np.abs(points.height) < band)
-    if np.count_nonzero(core) < 30:
+    if np.count_nonzero(core) < MIN_POINTS:
         return None
     grid = Grid.for_element(
         element, point_spacing(element, points.chainage[core], points.clock[core])
@@ -99,9 +114,9 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
     local = np.where(reached, value.ravel()[cell], 0.0)
     tolerance = 4 * noise + slope.ravel()[cell]
     belongs = facing & reached & (np.abs(level - local) < tolerance)
-    # A stray point makes a cell of its own: the surface has company.
-    company = box_sum(grid.count(cell[belongs]), 2)
-    belongs &= company.ravel()[cell] >= 3
+    # Isolated outliers occupy a cell alone.
+    n_around = box_sum(grid.count(cell[belongs]), 2)
+    belongs &= n_around.ravel()[cell] >= 3
 
     above = (
         near
@@ -110,15 +125,15 @@ def own_surface(element: Element, points: Unrolled) -> Surface | None:
         & (level > 4 * noise)
         & (level > local + tolerance)
     )
-    foreign = grid.count(cell[above]) >= 2
+    overlain = grid.count(cell[above]) >= 2
     sigma = local_noise(grid, cell[belongs], points.height[belongs])
-    return Surface(grid, points, belongs, cell, sigma, foreign)
+    return ElementSurface(grid, points, belongs, cell, sigma, overlain)
 
 
 def _first_contour(
-    grid: Grid, points: Unrolled, cell: np.ndarray, facing: Flags, sigma: Array
+    grid: Grid, points: UnrolledPoints, cell: np.ndarray, facing: Flags, sigma: Array
 ) -> Array:
-    """Contour through the medians of cells, whatever else is in some of them."""
+    """Height per cell of a contour fitted to the medians of cells, which bear outliers."""
     n_cells = grid.n_rows * grid.n_columns
     median, n = group_median(cell[facing], points.height[facing], n_cells)
     median, n = median.reshape(grid.shape), n.reshape(grid.shape)
@@ -127,12 +142,12 @@ def _first_contour(
 
 
 def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flags) -> Array:
-    """Level of the own surface per cell above the contour, nan where it does not reach."""
+    """Height of the surface above the contour per cell, nan where it was not reached."""
     at_contour = facing & (np.abs(level) < 3 * noise)
     value = grid.mean(cell[at_contour], level[at_contour])
     # Where most points of a cell lie off the contour, the surface has left it.
-    strays = grid.count(cell[facing]) - grid.count(cell[at_contour])
-    value[strays > grid.count(cell[at_contour])] = np.nan
+    n_off = grid.count(cell[facing]) - grid.count(cell[at_contour])
+    value[n_off > grid.count(cell[at_contour])] = np.nan
     step = STEEPEST_FLANK * max(grid.row_size, grid.column_size)
 
     open_points = np.flatnonzero(facing)
@@ -140,7 +155,7 @@ def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flag
         known = np.isfinite(value)
         weight = box_sum(known * 1.0)
         predicted = box_sum(np.where(known, value, 0.0)) / np.maximum(weight, 1)
-        # Sparse scans leave cells empty: look one further where the nearest know nothing.
+        # Sparse scans leave cells empty: predict from one cell further where there is none near.
         weight_2 = box_sum(known * 1.0, 2)
         further = box_sum(np.where(known, value, 0.0), 2) / np.maximum(weight_2, 1)
         predicted = np.where(weight > 0, predicted, further)
@@ -159,7 +174,7 @@ def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flag
 
 
 def _steepness(value: Array) -> Array:
-    """How much the surface rises within a cell, metres; 0 where it cannot be told."""
+    """Rise of the surface within a cell, metres; 0 where it is not known."""
     around = np.pad(value, ((1, 1), (0, 0)), constant_values=np.nan)
     along = np.abs(around[2:] - around[:-2]) / 2
     across = np.abs(np.roll(value, -1, axis=1) - np.roll(value, 1, axis=1)) / 2

@@ -6,7 +6,7 @@ The contour's height above the element's fitted surface is
 
 where every coefficient is a cubic spline with a knot each two diameters. A dent is
 shorter than that, so it cannot bend the contour; taper, bow and ovality can. Where the
-arc cannot tell two terms apart, a weak prior (a random walk along the knots) does.
+arc cannot separate two terms, a weak prior (a random walk along the knots) does.
 """
 
 from dataclasses import dataclass

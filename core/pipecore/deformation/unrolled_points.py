@@ -14,7 +14,7 @@ Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Unrolled:
+class UnrolledPoints:
     """Points in the coordinates of an element; all arrays of shape (n,).
 
     Parameters
@@ -33,9 +33,9 @@ class Unrolled:
     height: Array
     alignment: Array
 
-    def __getitem__(self, rows: Flags | NDArray[np.intp]) -> "Unrolled":
+    def __getitem__(self, rows: Flags | NDArray[np.intp]) -> "UnrolledPoints":
         """Return the given points."""
-        return Unrolled(
+        return UnrolledPoints(
             self.chainage[rows],
             self.distance[rows],
             self.clock[rows],
@@ -44,7 +44,7 @@ class Unrolled:
         )
 
 
-def unroll(element: Element, xyz: Array, normals: Array) -> Unrolled:
+def unroll(element: Element, xyz: Array, normals: Array) -> UnrolledPoints:
     """Return points (n, 3) with their normals in the coordinates of an element."""
     chainage, distance, clock, height, alignment = np.empty((5, len(xyz)))
     slope = (element.radius_end - element.radius) / element.axis.length
@@ -58,7 +58,7 @@ def unroll(element: Element, xyz: Array, normals: Array) -> Unrolled:
         height = from_centre - element.radius
         alignment = np.abs(np.einsum("ij,ij->i", outward, normals))
         alignment /= np.maximum(from_centre, 1e-9)
-    return Unrolled(chainage, distance, clock, height, alignment)
+    return UnrolledPoints(chainage, distance, clock, height, alignment)
 
 
 def surface_distance(element: Element, xyz: Array) -> Array:
@@ -82,7 +82,7 @@ def stretch(element: Element, clock: Array | float) -> Array:
     return np.asarray(1.0 + element.radius * outward / axis.bend_radius)
 
 
-def least_stretch(element: Element) -> float:
+def min_stretch(element: Element) -> float:
     """Least value of `stretch` all round; not quite zero in the tightest bend."""
     if not isinstance(element.axis, ArcAxis):
         return 1.0
