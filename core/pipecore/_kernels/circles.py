@@ -142,3 +142,15 @@ def geometric_circle(x, y, cx, cy, r, reach, weights, n_iterations):
         if s0 * s0 + s1 * s1 + s2 * s2 < 1e-12 * r * r:
             break
     return cx, cy, r
+
+
+@njit(cache=True, nogil=True)
+def covered_arc(angles, max_gap):
+    """Arc that sorted angles cover; gaps up to `max_gap` count as covered."""
+    n = angles.shape[0]
+    uncovered = 0.0
+    for i in range(n):
+        gap = angles[i] - angles[i - 1] if i > 0 else angles[0] + 2.0 * math.pi - angles[n - 1]
+        if gap > max_gap:
+            uncovered += gap
+    return 2.0 * math.pi - uncovered

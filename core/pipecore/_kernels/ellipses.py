@@ -3,7 +3,7 @@
 Points are given in the frame of their stack: (u, v) in the profile's plane, normals as
 (u, v, d) with d along the stack's direction. The plane cuts a cylinder of axis a in an
 ellipse with semi-minor axis r and semi-major axis r / |a·d|. Seen along a it is a circle;
-that circle is what is fitted.
+that circle, or an oval where it does not do, is what is fitted.
 """
 
 import math
@@ -11,14 +11,17 @@ import math
 import numpy as np
 from numba import njit
 
-from pipecore._kernels.circles import geometric_circle, taubin_circle
+from pipecore._kernels.circles import covered_arc, taubin_circle
 from pipecore._kernels.draws import draw_fast, seeded
 from pipecore._kernels.eigen import eigenvalues, eigenvector
+from pipecore._kernels.oval_sections import N_SHAPE, fit_section, lies_on_section, radius_towards
 
 MIN_PAIR_COS = 0.94
 """Normals of two points whose cosine is larger tell no axis."""
 COS_HALF_PAIR = 0.985
 """Normals that are all closer than this to one direction are so close to each other too."""
+ON_ONE_SECTION = 0.95
+"""A curve with more of its points on one section needs no splitting."""
 MAX_FAILURES = 2
 """A curve is left alone after this many draws in which no piece of it was found."""
 
@@ -221,8 +224,8 @@ def best_circle(
 
 
 @njit(cache=True, nogil=True)
-def share_on_one_circle(uv, normals, tolerance, min_cos_tilt):
-    """Share of a curve's points on the circle that fits them all best, seen along their axis."""
+def share_on_one_section(uv, normals, tolerance, max_gap, min_cos_tilt):
+    """Share of a curve's points on the section that fits them all best, seen along their axis."""
     n = uv.shape[0]
     chosen = np.ones(n, np.bool_)
     au, av, ad, _, _ = common_axis(normals, chosen)
@@ -230,14 +233,13 @@ def share_on_one_circle(uv, normals, tolerance, min_cos_tilt):
         return 0.0
     x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     look_along(uv, normals, au, av, ad, x, y, mx, my)
-    weights = np.ones(n)
-    cx, cy, r = taubin_circle(x, y, weights)
-    if not r > 0.0:
+    weights, shape = np.empty(n), np.empty(N_SHAPE)
+    cx, cy = fit_section(x, y, tolerance, max_gap, 5, weights, shape)
+    if not math.isfinite(cx):
         return 0.0
-    cx, cy, r = geometric_circle(x, y, cx, cy, r, 4.0 * tolerance, weights, 5)
     count = 0
     for k in range(n):
-        count += fits_circle(x[k], y[k], mx[k], my[k], cx, cy, r, 1.5 * tolerance, 0.8)
+        count += lies_on_section(x[k], y[k], mx[k], my[k], cx, cy, shape, 1.5 * tolerance, 0.8)
     return count / n
 
 
@@ -267,6 +269,7 @@ def split_curves(
     stop,
     min_points,
     tolerance,
+    max_gap,
     cos_radial,
     min_cos_tilt,
     max_radius,
@@ -284,7 +287,8 @@ def split_curves(
         n = b - a
         if n < min_points:
             continue
-        if share_on_one_circle(uv[a:b], normals[a:b], tolerance, min_cos_tilt) > 0.95:
+        share = share_on_one_section(uv[a:b], normals[a:b], tolerance, max_gap, min_cos_tilt)
+        if share > ON_ONE_SECTION:
             continue
         free = np.ones(n, np.bool_)
         inliers = np.empty(n, np.bool_)
@@ -317,18 +321,6 @@ def split_curves(
             n_free -= count
 
 
-@njit(cache=True, nogil=True)
-def covered_arc(angles, max_gap):
-    """Arc that sorted angles cover; gaps up to `max_gap` count as covered."""
-    n = angles.shape[0]
-    uncovered = 0.0
-    for i in range(n):
-        gap = angles[i] - angles[i - 1] if i > 0 else angles[0] + 2.0 * math.pi - angles[n - 1]
-        if gap > max_gap:
-            uncovered += gap
-    return 2.0 * math.pi - uncovered
-
-
 N_FIT_COLUMNS = 14
 """Columns of a fit: centre u, v; axis u, v, d; radius; rms; arc; points;
 share of radial normals; where the normals meet u, v, d, and the points' distance from there."""
@@ -354,18 +346,16 @@ def fit_curves(
         points, vectors = uv[a:b], normals[a:b]
         chosen = np.ones(n, np.bool_)
         x, y, mx, my = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-        weights = np.ones(n)
+        weights, shape = np.empty(n), np.empty(N_SHAPE)
         au, av, ad, l1, l2 = common_axis(vectors, chosen)
         # Also where they are nan.
         if not (ad >= min_cos_tilt and l1 <= max_off_axis * l2):
             continue
         tu, tv = look_along(points, vectors, au, av, ad, x, y, mx, my)
-        cx, cy, r = taubin_circle(x, y, weights)
-        if not r > 0.0:
+        cx, cy = fit_section(x, y, tolerance, max_gap, 8, weights, shape)
+        if not math.isfinite(cx):
             continue
-        cx, cy, r = geometric_circle(x, y, cx, cy, r, 4.0 * tolerance, weights, 8)
-        if not r > 0.0:
-            continue
+        r = shape[0]
         total = ss = 0.0
         xx = xy = xz = yy = yz = zz = bx = by = bz = 0.0
         n_in = n_radial = 0
@@ -378,7 +368,7 @@ def fit_curves(
             angles[n_in] = math.atan2(dy, dx)
             n_in += 1
             total += weights[k]
-            ss += weights[k] * (d - r) ** 2
+            ss += weights[k] * (d - radius_towards(shape, dx / d, dy / d)) ** 2
             radial = (dx * mx[k] + dy * my[k]) / d
             n_radial += abs(radial) > 0.9
             # Normal equations of the point nearest to all normals' lines.

@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from pipecore._kernels.circles import geometric_circle, taubin_circle
-from pipecore._kernels.ellipses import covered_arc
+from pipecore._kernels.circles import covered_arc, geometric_circle, taubin_circle
 
 
 @njit(cache=True, nogil=True)

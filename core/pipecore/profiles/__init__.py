@@ -237,7 +237,8 @@ class _Cutter:
         piece = np.zeros(len(curves.points), np.int64)
         ellipse_kernels.split_curves(
             curves.uv, curves.normals, curves.starts, 0, len(curves), MIN_CURVE,
-            surface.tolerance, 0.9, np.cos(np.pi / 4), self._max_radius, 60, MAX_PIECES, piece,
+            surface.tolerance, 4.0 * surface.voxel, 0.9, np.cos(np.pi / 4), self._max_radius, 60,
+            MAX_PIECES, piece,
         )  # fmt: skip
         profile = np.repeat(curves.profile_index, np.diff(curves.starts))
         label = curves.curve_of_point * (MAX_PIECES + 1) + piece

@@ -140,8 +140,8 @@ def test_that_a_curve_of_two_pipes_is_split_into_its_pipes_and_a_single_one_left
     normals = np.concatenate([both[1], small[1]])
     piece = np.zeros(120, np.int64)
     kernels.split_curves(
-        uv, normals, np.array([0, 80, 120]), 0, 2, 6, 0.004, 0.9, np.cos(np.pi / 4), 5.0, 60, 6,
-        piece,
+        uv, normals, np.array([0, 80, 120]), 0, 2, 6, 0.004, 0.03, 0.9,
+        np.cos(np.pi / 4), 5.0, 60, 6, piece,
     )  # fmt: skip
     assert (piece[80:] == 0).all()
     labels = [piece[:80][origin == k] for k in (0, 1)]

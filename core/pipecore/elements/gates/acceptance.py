@@ -34,8 +34,10 @@ LONG = 3.0
 """... where a straight is longer than this many radii: no corner and no chance is."""
 MIN_BEND_RADIUS, MIN_BEND_LENGTH = 1.02, 0.4
 """In radii: a torus with less of a hole or a shorter axis is a chance."""
-MAX_WAVINESS = 0.010
-"""Largest standard deviation of a surface about its shape beyond noise, in radii."""
+SCATTER = 0.010, 0.035
+WAVINESS = 0.010, 0.026
+"""Largest standard deviations of the points about the surface's shape, and of its cells beyond
+noise, in radii: of what is seen narrowly and short, and widely and long."""
 MAX_BEND_RADIUS_SD = 0.3
 """Largest standard deviation of a bend radius, as a share of it."""
 MIN_TAPER_CHANGE, MIN_TAPER_LENGTH = 0.06, 0.3
@@ -88,8 +90,21 @@ def has_a_wanted_size(t: Trial) -> bool:
 
 def lies_on_its_points(t: Trial) -> bool:
     """The points scatter about the surface hardly more than they do about their planes."""
-    limit = min(max(4.0 * t.surface.noise, 0.004), 0.08 * t.radius)
+    wavy = _allowed_waviness(t, *SCATTER)
+    limit = min(max(4.0 * t.surface.noise, 0.004, wavy), 0.08 * t.radius)
     return bool(t.found.fit.sigma <= t.slack * limit)
+
+
+def _allowed_waviness(t: Trial, least: float, most: float) -> float:
+    """How far a surface may leave its shape, metres: what is seen widely and long may more.
+
+    From 100° to 200° of arc and from one to four radii of length it rises from the least to
+    the most share of the radius.
+    """
+    wide = (t.arc - np.deg2rad(100.0)) / np.deg2rad(100.0)
+    long = (t.lengths - 1.0) / 3.0
+    share = float(np.clip(wide, 0.0, 1.0) * np.clip(long, 0.0, 1.0))
+    return (least + (most - least) * share) * t.radius
 
 
 def has_a_known_radius(t: Trial) -> bool:
@@ -138,8 +153,10 @@ def is_no_cloth(t: Trial) -> bool:
     xyz = t.surface.xyz[t.found.own]
     residual, _, _ = t.found.fit.model.residuals(xyz)
     chainage, _, clock = t.found.axis.pipe_coordinates(xyz)
+    if t.found.section is not None:
+        residual = residual - t.found.section.height(chainage, clock)
     wave = waviness(chainage, clock, residual, t.radius, t.arc)
-    return not wave > MAX_WAVINESS * t.radius
+    return not wave > _allowed_waviness(t, *WAVINESS)
 
 
 def shows_the_arc_of_a_bend(t: Trial) -> bool:

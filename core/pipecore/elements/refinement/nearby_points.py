@@ -1,7 +1,7 @@
 """All points of the full cloud around an axis."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from pipecore._kernels import nearby as kernels
 from pipecore._kernels.grouping import group_by_label, group_into
 from pipecore._kernels.voxels import rename_voxels
 from pipecore.allocation import Allocate, in_memory
+from pipecore.elements.refinement.section_model import SectionModel
 from pipecore.elements.refinement.surface_fits import SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.progress import NoProgress, Progress
@@ -58,6 +59,19 @@ class PointsOn:
     lean: Array
     inside: Callable[[float, float], Array]
     spacing: float
+
+    def about(self, section: SectionModel, band: float) -> "PointsOn":
+        """Those within `band` of a section model, with distances from that."""
+        residual = self.residual - section.height(self.chainage, self.clock)
+        on = np.flatnonzero(np.abs(residual) <= band)
+        return replace(
+            self,
+            own=self.own[on],
+            residual=residual[on],
+            chainage=self.chainage[on],
+            clock=self.clock[on],
+            lean=self.lean[on],
+        )
 
 
 def _in_order_met(

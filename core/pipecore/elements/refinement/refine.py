@@ -17,8 +17,13 @@ from pipecore.elements.refinement.extent import (
     find_extent,
     section_misfit,
 )
-from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.nearby_points import NearbyPoints, PointsOn
 from pipecore.elements.refinement.raised_bands import is_off_bands
+from pipecore.elements.refinement.section_model import (
+    MAX_HEIGHT,
+    SectionModel,
+    fit_section_model,
+)
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,
@@ -28,7 +33,7 @@ from pipecore.elements.refinement.surface_fits import (
 )
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, LineAxis, cross
-from pipecore.robust import sample_evenly
+from pipecore.robust import robust_sd, sample_evenly
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -54,6 +59,14 @@ MAX_RADIUS_CHANGE = 0.25
 """A fit that leaves the proposed radius by more has found something else."""
 PATCHES = 12, 8, 5
 """Patches of a sphere around and up, and the points from which on one counts."""
+ROUGH_NOISE, ROUGH_SHARE = 1.5, 0.005
+"""Where points scatter about the round surface by more than so many times their noise, and than
+this share of the radius, the section may be no circle."""
+OVAL_BAND, CLEARLY_BETTER = 0.13, 0.75
+"""Points are looked at up to this distance from the round surface, in radii; a section model
+counts where it leaves at most this share of their scatter."""
+MIN_SIGMA = 0.0005
+"""No guess of the scatter is smaller, metres."""
 N_ROUNDS = 3
 HARDLY_ROUGH, ROUGH, VERY_ROUGH = 1.15, 1.5, 3.0
 """Slack for pieces fitted to a sample at last, and for those whose last round of fitting is
@@ -82,6 +95,8 @@ class Fitted:
     own: Indices
     extent: Extent
     misfit: float
+    section: SectionModel | None = None
+    """How its section leaves the round one; None where it hardly does."""
 
     @property
     def radius_sd(self) -> float:
@@ -138,56 +153,185 @@ def refine_piece(
     if isinstance(piece.model, SphereSurface):
         return _refine_sphere(piece.model, nearby, is_free, is_promising, used)
     model = piece.model
-    sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
-    axis = axis_between(model, piece.low, piece.high)
+    guess = _Guess(
+        model,
+        axis_between(model, piece.low, piece.high),
+        max(nearby.surface.noise, 0.001, 0.01 * model.radius),
+    )
     fitted: Fitted | None = None
-    fit: SurfaceFit[Any] | None
-    for round_ in range(N_ROUNDS):
-        is_final = round_ == N_ROUNDS - 1
-        if is_final and not (fitted and is_promising(fitted, ROUGH)):
+    for round_ in range(N_ROUNDS - 1):
+        rough = _refine_roughly(guess, round_, nearby, is_free, used)
+        if rough is None:
             return None
-        margin = _margin(axis, model.radius, round_)
-        near = nearby.on_surface(
-            model, axis, margin, is_free,
-            band=_band(sigma), depth=INSIDE * model.radius, min_cos=RADIAL_COS,
-            is_rough=not is_final,
-        )  # fmt: skip
-        used.append(near.own)
-        extent = find_extent(
-            near.chainage, near.clock, near.residual, near.lean, near.inside,
-            axis.length, model.radius, near.spacing, sigma,
-        )  # fmt: skip
-        if extent is None:
-            return None
-        # Near the ends other surfaces begin, so the fit stays clear of them.
-        clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
-        own, own_clock, own_residual, chosen = points_between(
-            near.own, near.chainage, near.clock, near.residual,
-            extent.low, extent.high, clear, LEAST_CLEAR,
-        )  # fmt: skip
-        misfit = section_misfit(own_clock, own_residual, extent.arc)
-        if is_final:
-            told = partial(Fitted, axis=axis, own=own, extent=extent, misfit=misfit)
-            assert fitted is not None
-            # All but the fit itself is as it will be at last.
-            if (
-                not is_promising(told(fitted.fit), HARDLY_ROUGH)
-                and _off_bands(fitted.fit, chosen, nearby, near.spacing) is None
-            ):
-                return None
-            fit = fit_measured(
-                model, chosen, nearby, 3.0 * sigma, near.spacing,
-                partial(_holds, is_promising, told),
-            )  # fmt: skip
-        else:
-            fit = _fit_roughly(model, chosen, nearby, 3.0 * sigma)
-        if fit is None:
-            return None
-        fitted = Fitted(fit, axis, own, extent, misfit)
-        model = fit.model
-        axis = axis_through(model, axis.at(np.array([extent.low, extent.high])))
-        sigma = max(fit.sigma, 0.0005)
-    return fitted and _placed(fitted, axis)
+        guess, fitted = rough
+    if fitted is None or not is_promising(fitted, ROUGH):
+        return None
+    return _refine_finally(guess, fitted, nearby, is_free, is_promising, used)
+
+
+@dataclass(frozen=True, eq=False)
+class _Guess:
+    """What a round of refinement begins with: a surface, how far it reaches, its section.
+
+    The section model, if any, is counted along `axis`; `sigma` is the points' scatter about it.
+    """
+
+    model: LineSurface | ArcSurface
+    axis: LineAxis | ArcAxis
+    sigma: float
+    section: SectionModel | None = None
+
+    def after(self, fit: SurfaceFit[Any], low: float, high: float) -> "_Guess":
+        """The fitted surface between two chainages of the old axis, still without a section."""
+        axis = axis_through(fit.model, self.axis.at(np.array([low, high])))
+        return _Guess(fit.model, axis, max(fit.sigma, MIN_SIGMA))
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """The points on a guessed surface, how far they reach, and those that a fit takes."""
+
+    near: PointsOn
+    extent: Extent
+    own: Indices
+    chosen: Indices
+    misfit: float
+
+
+def _look_at(
+    guess: _Guess, round_: int, nearby: NearbyPoints, is_free: Flags, used: list[Indices]
+) -> _Look | None:
+    """The points on a guessed surface; None where they do not cover its axis."""
+    model, axis, sigma, section = guess.model, guess.axis, guess.sigma, guess.section
+    near = nearby.on_surface(
+        model, axis, _margin(axis, model.radius, round_), is_free,
+        band=_band(sigma) + (section.max_height if section else 0.0),
+        depth=INSIDE * model.radius, min_cos=RADIAL_COS, is_rough=round_ < N_ROUNDS - 1,
+    )  # fmt: skip
+    used.append(near.own)
+    if section is not None:
+        near = near.about(section, _band(sigma))
+    extent = find_extent(
+        near.chainage, near.clock, near.residual, near.lean, near.inside,
+        axis.length, model.radius, near.spacing, sigma,
+    )  # fmt: skip
+    if extent is None:
+        return None
+    # Near the ends other surfaces begin, so the fit stays clear of them.
+    clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
+    own, own_clock, own_residual, chosen = points_between(
+        near.own, near.chainage, near.clock, near.residual,
+        extent.low, extent.high, clear, LEAST_CLEAR,
+    )  # fmt: skip
+    misfit = section_misfit(own_clock, own_residual, extent.arc)
+    return _Look(near, extent, own, chosen, misfit)
+
+
+def _refine_roughly(
+    guess: _Guess, round_: int, nearby: NearbyPoints, is_free: Flags, used: list[Indices]
+) -> tuple[_Guess, Fitted | None] | None:
+    """A round on thinned points: the next guess, and the piece as it is now; None without one."""
+    look = _look_at(guess, round_, nearby, is_free, used)
+    if look is None:
+        # A section may be so far from round that the circle runs along its points nowhere.
+        oval = None if round_ else _fit_oval(guess, 2 * np.pi, nearby, is_free, used)
+        return None if oval is None else (oval[0], None)
+    scale = 3.0 * guess.sigma
+    fit = _fit_roughly(
+        guess.model, look.chosen, nearby, scale, _flattened(guess.axis, guess.section)
+    )
+    if fit is None:
+        return None
+    fitted = Fitted(fit, guess.axis, look.own, look.extent, look.misfit, guess.section)
+    following = guess.after(fit, look.extent.low, look.extent.high)
+    rough = max(ROUGH_NOISE * nearby.surface.noise, ROUGH_SHARE * fit.model.radius)
+    if guess.section is None and following.sigma <= rough:
+        return following, fitted
+    oval = _fit_oval(following, look.extent.arc, nearby, is_free, used)
+    if oval is None:
+        return following, fitted
+    following, fit = oval
+    return following, Fitted(fit, following.axis, look.own, look.extent, 0.0, following.section)
+
+
+def _refine_finally(
+    guess: _Guess,
+    fitted: Fitted,
+    nearby: NearbyPoints,
+    is_free: Flags,
+    is_promising: Callable[[Fitted, float], bool],
+    used: list[Indices],
+) -> Fitted | None:
+    """The last round, on all points; `fitted` is how the piece was before."""
+    look = _look_at(guess, N_ROUNDS - 1, nearby, is_free, used)
+    if look is None:
+        return None
+    told = partial(
+        Fitted,
+        axis=guess.axis,
+        own=look.own,
+        extent=look.extent,
+        misfit=look.misfit,
+        section=guess.section,
+    )
+    # All but the fit itself is as it will be at last.
+    if (
+        not is_promising(told(fitted.fit), HARDLY_ROUGH)
+        and _off_bands(fitted.fit, look.chosen, nearby, look.near.spacing) is None
+    ):
+        return None
+    fit = fit_measured(
+        guess.model, look.chosen, nearby, 3.0 * guess.sigma, look.near.spacing,
+        partial(_holds, is_promising, told), _flattened(guess.axis, guess.section),
+    )  # fmt: skip
+    if fit is None:
+        return None
+    last = guess.after(fit, look.extent.low, look.extent.high)
+    return _placed(told(fit), last.axis)
+
+
+def _fit_oval(
+    guess: _Guess, arc: float, nearby: NearbyPoints, is_free: Flags, used: list[Indices]
+) -> tuple[_Guess, SurfaceFit[Any]] | None:
+    """A guess with a section model, and the fit of its surface without the section's heights.
+
+    None where the points scatter about it hardly less than about the round surface.
+    """
+    model = guess.model
+    near = nearby.on_surface(
+        model, guess.axis, 0.0, is_free, band=OVAL_BAND * model.radius,
+        depth=INSIDE * model.radius, min_cos=RADIAL_COS, is_rough=True,
+    )  # fmt: skip
+    used.append(near.own)
+    found = fit_section_model(near.chainage, near.clock, near.residual, model.radius, arc)
+    if found is None:
+        return None
+    left = near.residual - found.height(near.chainage, near.clock)
+    before, after = robust_sd(near.residual - np.median(near.residual)), robust_sd(left)
+    section = found.without_pose()
+    if after > CLEARLY_BETTER * before or section.max_height > MAX_HEIGHT * model.radius:
+        return None
+    on = near.own[np.abs(left) <= _band(after)]
+    fit = _fit_roughly(model, on, nearby, 3.0 * after, _flattened(guess.axis, section))
+    if fit is None:
+        return None
+    return replace(guess.after(fit, 0.0, guess.axis.length), section=section), fit
+
+
+def _flattened(
+    axis: LineAxis | ArcAxis, section: SectionModel | None
+) -> Callable[[Array], Array] | None:
+    """What takes a section's heights off points, so that a round surface fits them."""
+    if section is None:
+        return None
+
+    def flatten(xyz: Array) -> Array:
+        chainage, _, clock = axis.pipe_coordinates(xyz)
+        up, right = axis.frame(chainage)
+        outward = np.cos(clock)[:, None] * up + np.sin(clock)[:, None] * right
+        return np.asarray(xyz - section.height(chainage, clock)[:, None] * outward)
+
+    return flatten
 
 
 def _placed(fitted: Fitted, axis: LineAxis | ArcAxis) -> Fitted:
@@ -195,7 +339,14 @@ def _placed(fitted: Fitted, axis: LineAxis | ArcAxis) -> Fitted:
     old = fitted.extent
     gaps = tuple((a - old.low, b - old.low) for a, b in old.gaps)
     extent = Extent(0.0, axis.length, old.arc, old.coverage, gaps)
-    return Fitted(fitted.fit, axis, fitted.own, extent, fitted.misfit)
+    return Fitted(
+        fitted.fit,
+        axis,
+        fitted.own,
+        extent,
+        fitted.misfit,
+        fitted.section.from_chainage(old.low) if fitted.section else None,
+    )
 
 
 def axis_between(model: LineSurface | ArcSurface, low: float, high: float) -> LineAxis | ArcAxis:
@@ -231,12 +382,18 @@ def _band(sigma: float) -> float:
 
 
 def _fit_roughly(
-    model: AnySurface, thinned: Indices, nearby: NearbyPoints, scale: float
+    model: AnySurface,
+    thinned: Indices,
+    nearby: NearbyPoints,
+    scale: float,
+    flatten: Callable[[Array], Array] | None = None,
 ) -> SurfaceFit[Any] | None:
     """Fit the model to thinned points."""
     if len(thinned) < LEAST_POINTS:
         return None
     points = nearby.surface.xyz[sample_evenly(thinned, MAX_ROUGH_POINTS)]
+    if flatten is not None:
+        points = flatten(points)
     return _fit_sample(model, points, scale, min(len(thinned), SURE_POINTS))
 
 
@@ -271,6 +428,7 @@ def fit_measured(
     scale: float,
     spacing: float,
     holds: Callable[[SurfaceFit[Any]], bool] = lambda fit: True,
+    flatten: Callable[[Array], Array] | None = None,
 ) -> SurfaceFit[Any] | None:
     """Fit a model as elements are measured: to all points, free of bands around the pipe.
 
@@ -297,6 +455,8 @@ def fit_measured(
         return None
     _, points = nearby.behind(thinned)
     points = sample_evenly(points, MAX_FIT_POINTS)
+    if flatten is not None:
+        points = flatten(points)
     start = model
     if len(points) > MANY_POINTS:
         sampled = _fit_sample(model, sample_evenly(points, SURE_POINTS), scale, len(points))
@@ -308,7 +468,7 @@ def fit_measured(
     fit = fit_surface(start, points, scale)
     if fit is None or not _is_still(fit, model):
         return None
-    own = _off_bands(fit, thinned, nearby, spacing)
+    own = _off_bands(fit, thinned, nearby, spacing) if flatten is None else None
     if own is None:
         return fit
     if len(own) >= LEAST_POINTS:
@@ -361,7 +521,7 @@ def _refine_sphere(
         if fit is None:
             return None
         model = fit.model
-        sigma = max(fit.sigma, 0.0005)
+        sigma = max(fit.sigma, MIN_SIGMA)
         fitted = _fitted_sphere(fit, own, nearby)
         if round_ == 0 and not is_promising(fitted, VERY_ROUGH):
             return None

@@ -1,0 +1,50 @@
+"""Deformed pipes are found: the more a pipe is deformed, the more it is looked for."""
+
+import numpy as np
+import pytest
+
+from pipecore import detect
+from pipecore.types import ElementKind, PointCloud
+from tests.core.shapes import jittered, random_rotation
+
+
+def pipe(rng, radius, *, ovality=0.0, waviness=0.0, arc=2 * np.pi, noise=0.001, length=None):
+    """A lone pipe by formula: oval, or wavy over 0.3 radii; no simulator of ours draws it."""
+    length = max(1.0, 5 * radius) if length is None else length
+    s, around = jittered(rng, length, arc * radius, max(0.006, radius / 30))
+    clock = around / radius - arc / 2
+    rho = radius * (1 + ovality / 2 * np.cos(2 * (clock - rng.uniform(0, np.pi))))
+    if waviness:
+        waves = zip(
+            rng.normal(0, 3.3 / radius, 150),
+            np.round(rng.normal(0, 3.3, 150)),
+            rng.uniform(0, 6.3, 150),
+            strict=True,
+        )
+        field = sum(np.cos(a * s + k * clock + phase) for a, k, phase in waves)
+        rho = rho + waviness * radius * field * np.sqrt(2 / 150)
+    xyz = np.stack([rho * np.cos(clock), rho * np.sin(clock), s], axis=1)
+    xyz = (xyz + noise * rng.normal(size=xyz.shape)) @ random_rotation(rng).T
+    return PointCloud(xyz=xyz, origin=np.array([432_100.0, 6_201_870.0, 110.0])), length
+
+
+@pytest.mark.parametrize("radius", [0.03, 0.0572, 0.2032, 0.3, 0.75])
+@pytest.mark.parametrize("ovality", [0.03, 0.08, 0.12])
+def test_that_an_oval_pipe_is_one_element_of_its_radius_and_ovality(rng, radius, ovality):
+    cloud, length = pipe(rng, radius, ovality=ovality)
+    (element,) = detect(cloud).elements
+    assert element.kind is ElementKind.CYLINDER
+    assert element.radius == pytest.approx(radius, rel=0.003, abs=3 * element.radius_sd)
+    assert element.ovality == pytest.approx(ovality, rel=0.1, abs=3 * element.ovality_sd)
+    assert element.axis.length == pytest.approx(length, abs=0.05)
+
+
+@pytest.mark.parametrize("radius", [0.0842, 0.3, 1.5])
+@pytest.mark.parametrize("arc_deg", [360, 180])
+def test_that_a_pipe_of_a_wavy_surface_is_found_whole(rng, radius, arc_deg):
+    """Corrosion, cladding, bark: 1 % of the radius everywhere, beyond noise."""
+    cloud, length = pipe(rng, radius, waviness=0.01, arc=np.deg2rad(arc_deg))
+    (element,) = detect(cloud).elements
+    assert element.kind is ElementKind.CYLINDER
+    assert element.radius == pytest.approx(radius, rel=0.01)
+    assert element.axis.length == pytest.approx(length, rel=0.05)
