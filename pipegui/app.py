@@ -22,12 +22,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from PySide6.QtCore import QSettings  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
+    from pipegui.composition import compose  # noqa: PLC0415
+    from pipegui.connections import connect_crash_guard  # noqa: PLC0415
+    from pipegui.screenshot import Screenshot  # noqa: PLC0415
     from pipegui.style import theme  # noqa: PLC0415
-    from pipegui.window.main_window import MainWindow  # noqa: PLC0415
-    from pipegui.window.views import make_parts  # noqa: PLC0415
+    from pipegui.window.views import make_views  # noqa: PLC0415
     from pipegui.work.crash_guard import CrashGuard  # noqa: PLC0415
-    from pipegui.work.job_queue import Jobs  # noqa: PLC0415
-    from pipegui.work.kernel_warmup import Warming  # noqa: PLC0415
+    from pipegui.work.job_queue import JobQueue  # noqa: PLC0415
+    from pipegui.work.kernel_warmup import KernelWarmup  # noqa: PLC0415
 
     app = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(app, QApplication)
@@ -40,38 +42,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
         is_shot = options.screenshot is not None
         ini = QSettings.Format.IniFormat
         stored = QSettings(f"{scratch}/layout.ini", ini) if is_shot else QSettings()
-        _speak(app, "en" if is_shot else str(stored.value("language", "")))
+        _use_language(app, "en" if is_shot else str(stored.value("language", "")))
         theme.apply_theme(app)
-        window = MainWindow(make_parts(), Jobs(), stored, None if is_shot else _rescue_folder())
+        application = compose(
+            make_views(), JobQueue(), stored, None if is_shot else _folder_for_copies()
+        )
+        window, session = application.window, application.session
+        scans, autosave = application.controllers.scans, application.controllers.autosave
         guard = CrashGuard(window)
-        guard.happened.connect(window.tell_crash)
+        connect_crash_guard(guard, session, application.controllers)
         guard.install()
         window.show()
-        warming = Warming(stored)
-        warming.started.connect(window.status.start_warming)
-        warming.ended.connect(window.status.end_warming)
-        if not is_shot:
-            warming.start()
+        warmup = KernelWarmup(stored)
+        warmup.started.connect(window.status.start_warming)
+        warmup.ended.connect(window.status.end_warming)
         if is_shot:
-            from pipegui.screenshot import Screenshot  # noqa: PLC0415
-
-            Screenshot(window, options.screenshot).ended.connect(app.exit)
-        elif options.detect:
-            window.jobs.scan_read.connect(lambda _: window.detect())
-        window.open_files(options.files)
-        if window.projects.rescue is not None:
-            window.projects.rescue.offer()
+            Screenshot(window, session.jobs, options.screenshot).ended.connect(app.exit)
+        else:
+            warmup.start()
+        if is_shot or options.detect:
+            session.jobs.scan_read.connect(lambda _: scans.detect())
+        scans.open_files(options.files)
+        if autosave is not None:
+            autosave.offer_recovery()
         code = app.exec()
-        warming.close()
+        warmup.close()
         guard.uninstall()
-        window.projects.discard()
+        application.controllers.project.discard_changes()
         window.close()
         window.deleteLater()
         return code
 
 
-def _speak(app: "QApplication", chosen: str) -> None:
-    """Choose the language of all texts, Qt's own too; numbers keep the decimal point."""
+def _use_language(app: "QApplication", chosen: str) -> None:
+    """Translate all texts, Qt's own too; numbers keep the decimal point."""
     from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator  # noqa: PLC0415
 
     from pipegui.i18n import texts  # noqa: PLC0415
@@ -85,7 +89,7 @@ def _speak(app: "QApplication", chosen: str) -> None:
             app.installTranslator(translator)
 
 
-def _rescue_folder() -> Path:
+def _folder_for_copies() -> Path:
     from PySide6.QtCore import QStandardPaths  # noqa: PLC0415
 
     data = QStandardPaths.StandardLocation.AppDataLocation

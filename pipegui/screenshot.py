@@ -5,26 +5,36 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QImage
+from PySide6.QtWidgets import QWidget
 
-from pipegui.window.main_window import MainWindow
+from pipegui.work.job_queue import JobQueue
 
 LOOK_AGAIN_MS = 700
-PATIENCE = 40
-"""Looks after which the picture is taken as it is."""
+MAX_LOOKS = 40
+"""Pictures taken in vain, after which the next is saved as it is."""
 
 
 class Screenshot(QObject):
-    """Opens, detects, waits until all is drawn, saves the picture and ends."""
+    """Once a detection has ended, waits until all is drawn, saves the picture and ends.
+
+    Parameters
+    ----------
+    window : QWidget
+        What the picture is of.
+    jobs : JobQueue
+        Detects.
+    path : Path
+        Where the picture is saved.
+    """
 
     ended = Signal(int)
     """Exit code: 0 if the picture was saved, else 1."""
 
-    def __init__(self, window: MainWindow, path: Path) -> None:
+    def __init__(self, window: QWidget, jobs: JobQueue, path: Path) -> None:
         super().__init__(window)
         self._window, self._path = window, path
-        window.jobs.scan_read.connect(lambda _: window.detect())
-        window.jobs.detected.connect(lambda *_: self._look_again())
-        window.jobs.failed.connect(self._fail)
+        jobs.detected.connect(lambda *_: self._look_again())
+        jobs.failed.connect(self._fail)
         self._last: QImage | None = None
         self._n_looks = 0
 
@@ -35,7 +45,7 @@ class Screenshot(QObject):
         """Save the picture once it does not change any more: camera at rest, all drawn."""
         picture = self._window.grab().toImage()
         self._n_looks += 1
-        if picture != self._last and self._n_looks < PATIENCE:
+        if picture != self._last and self._n_looks < MAX_LOOKS:
             self._last = picture
             self._look_again()
         elif not picture.save(str(self._path)):

@@ -14,10 +14,10 @@ from PySide6.QtCore import QCoreApplication, QSettings, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
+from pipegui.composition import Application, compose
 from pipegui.style import theme
-from pipegui.window.main_window import MainWindow
-from pipegui.window.views import make_parts
-from pipegui.work.job_queue import Jobs
+from pipegui.window.views import make_views
+from pipegui.work.job_queue import JobQueue
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 SIZE = 1600, 1000
@@ -41,11 +41,11 @@ def linger(seconds: float) -> None:
     wait_for(lambda: time.monotonic() > end)
 
 
-def picture(window: MainWindow, name: str) -> None:
+def picture(app: Application, name: str) -> None:
     """Save the window once it does not change any more."""
     last = QImage()
     end = time.monotonic() + PATIENCE
-    while (now := window.grab().toImage()) != last and time.monotonic() < end:
+    while (now := app.window.grab().toImage()) != last and time.monotonic() < end:
         last = now
         linger(LOOK_AGAIN)
     path = IMAGES / f"{name}.png"
@@ -54,62 +54,62 @@ def picture(window: MainWindow, name: str) -> None:
     print(path.name, flush=True)
 
 
-def walk(window: MainWindow) -> None:
+def walk(app: Application) -> None:
     """Go through the demo, with a picture at each station."""
-    panels, parts, actions = window.panels, window.parts, window.actions_
-    assert panels.plots is not None
-    picture(window, "guide-welcome")
+    window, session = app.window, app.session
+    panels, views, actions = window.panels, window.views, window.actions_
+    picture(app, "guide-welcome")
 
     actions["demo"].trigger()
-    wait_for(lambda: window.document.scan is not None and not window.jobs.is_busy)
-    picture(window, "guide-opened")
+    wait_for(lambda: session.document.scan is not None and not session.jobs.is_busy)
+    picture(app, "guide-opened")
 
     actions["detect"].trigger()
-    wait_for(lambda: window.document.result is not None and not window.jobs.is_busy)
-    picture(window, "main-window")
+    wait_for(lambda: session.document.result is not None and not session.jobs.is_busy)
+    picture(app, "main-window")
 
     panels.message.hide()
-    panels.plots.setCurrentWidget(parts.map)
-    picture(window, "guide-map")
+    panels.plots.setCurrentWidget(views.map)
+    picture(app, "guide-map")
 
-    panels.plots.setCurrentWidget(parts.section)
-    picture(window, "guide-section")
+    panels.plots.setCurrentWidget(views.section)
+    picture(app, "guide-section")
 
-    panels.plots.setCurrentWidget(parts.radius_plot)
+    panels.plots.setCurrentWidget(views.radius_plot)
     actions["show_surfaces"].setChecked(True)
     actions["fit"].trigger()
-    picture(window, "guide-surfaces")
+    picture(app, "guide-surfaces")
     actions["show_surfaces"].setChecked(False)
 
     actions["next_deformation"].trigger()
     actions["clip_to_selection"].trigger()
-    picture(window, "guide-clip")
+    picture(app, "guide-clip")
     actions["clip"].setChecked(False)
 
     panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
     actions["fit"].trigger()
-    picture(window, "guide-stacks")
+    picture(app, "guide-stacks")
 
     actions["appearance_dark"].trigger()
     panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Unchecked)
     actions["previous_deformation"].trigger()
-    picture(window, "guide-dark")
+    picture(app, "guide-dark")
 
 
 def main() -> None:
     """Take all pictures."""
-    app = QApplication(sys.argv[:1])
-    theme.apply_theme(app)
+    qt = QApplication(sys.argv[:1])
+    theme.apply_theme(qt)
     with TemporaryDirectory() as scratch:
         stored = QSettings(f"{scratch}/layout.ini", QSettings.Format.IniFormat)
-        window = MainWindow(make_parts(), Jobs(), stored)
-        window.actions_["appearance_light"].trigger()
-        window.resize(*SIZE)
-        window.show()
-        walk(window)
-        window.projects.discard()
-        window.close()
-        window.deleteLater()
+        app = compose(make_views(), JobQueue(), stored)
+        app.window.actions_["appearance_light"].trigger()
+        app.window.resize(*SIZE)
+        app.window.show()
+        walk(app)
+        app.controllers.project.discard_changes()
+        app.window.close()
+        app.window.deleteLater()
 
 
 if __name__ == "__main__":

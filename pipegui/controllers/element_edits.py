@@ -4,119 +4,63 @@ Targets are the selected elements. What needs the cloud's points runs in the bac
 """
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QInputDialog, QMenu
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtWidgets import QInputDialog, QWidget
 
 from pipecore.catalogues import sizes_of
 from pipecore.types import ElementKind, PointCloud, Result, ReviewState
+from pipegui.controllers.session import Session
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.model import commands, element_commands
-from pipegui.model import selection as selecting
-from pipegui.model.document import Document, Scan
+from pipegui.model.document import Scan
+from pipegui.model.selection import elements_of
 from pipegui.panels.project_tree import NodeKind
 from pipegui.work.job_queue import Edited
 from pipegui.work.worker import JobProgress
-
-if TYPE_CHECKING:
-    from pipegui.window.main_window import MainWindow
-
-_OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "")
-CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
-    NodeKind.SCAN: ("fit", "show_all", "", "detect", "detect_in_box", "", "rename", "close_scan"),
-    NodeKind.RUN: (*_OF_ELEMENTS, "rename", "detect_around", "delete"),
-    NodeKind.ELEMENT: (
-        *_OF_ELEMENTS,
-        "rename",
-        "kind",
-        "size",
-        "split",
-        "merge",
-        "",
-        "detect_around",
-        "delete",
-    ),
-    NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
-    NodeKind.DEFORMATION: ("zoom", "isolate", "", "accept", "reject", "reopen"),
-}
-"""Actions by the kind of row; "" separates."""
 
 NO_SIZE = mark("No nominal size")
 Reshape = Callable[[PointCloud, Result, JobProgress], Result]
 
 
-def conditions(document: Document) -> dict[str, bool]:
-    """What the selection is, by the names of what actions need."""
-    result, selection = document.result, document.selection
-    elements = selecting.elements_of(result, selection) if result is not None else []
-    return {
-        "elements": bool(elements),
-        "one_element": bool(selection.element_id) and len(elements) == 1,
-        "several_elements": len(elements) > 1 and bool(selection.others),
-        "deformation": bool(selection.deformation_id),
-        "box": document.view.clip_box is not None,
-    }
+class ElementEdits(QObject):
+    """Edits and reviews what is selected in the session's document."""
 
-
-class Edits:
-    """The part of the window's actions that changes elements and reviews."""
-
-    def __init__(self, window: "MainWindow") -> None:
-        self._window = window
+    def __init__(self, session: Session, window: QWidget) -> None:
+        super().__init__(session)
+        self._session, self._window = session, window
 
     def _targets(self) -> tuple[Scan, Result, list[int]]:
-        scan = self._window.document.scan
-        assert scan is not None
-        assert scan.result is not None
-        return (
-            scan,
-            scan.result,
-            selecting.elements_of(scan.result, self._window.document.selection),
-        )
+        """The active scan, its result, and the ids of the selected elements."""
+        document = self._session.document
+        assert document.scan is not None
+        assert document.scan.result is not None
+        result = document.scan.result
+        return document.scan, result, elements_of(result, document.selection)
 
-    # At once
+    # Immediate
 
     def delete(self) -> None:
         """Delete the selected elements."""
         _, _, ids = self._targets()
-        self._window.do(element_commands.delete_elements, ids)
+        self._session.do(element_commands.delete_elements, ids)
 
-    def rename(self) -> None:
-        """Let the user name what is selected in the tree, in its place."""
-        self._window.panels.docks["Project"].show()
-        self._window.panels.docks["Project"].raise_()
-        self._window.panels.tree.rename()
-
-    def take_name(self, scan_index: int, kind: NodeKind, item_id: int, name: str) -> None:
+    def name(self, scan_index: int, kind: NodeKind, item_id: int, name: str) -> None:
         """Name a scan, or a run or an element of the active one."""
         match kind:
             case NodeKind.SCAN:
-                self._window.do(element_commands.rename_scan, scan_index, name)
+                self._session.do(element_commands.rename_scan, scan_index, name)
             case NodeKind.RUN:
-                self._window.do(element_commands.rename_run, item_id, name)
+                self._session.do(element_commands.rename_run, item_id, name)
             case NodeKind.ELEMENT:
-                self._window.do(element_commands.rename_element, item_id, name)
+                self._session.do(element_commands.rename_element, item_id, name)
 
     def hide(self) -> None:
         """Hide the selected elements."""
-        self._window.do(commands.set_hidden, self._targets()[2], True)
-
-    def show_menu(self, kind: NodeKind, position: QPoint) -> None:
-        """Offer what can be done with the selected row of the tree."""
-        menu = QMenu(self._window)
-        menu.setObjectName("context")
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        for name in CONTEXT_MENUS[kind]:
-            if name:
-                menu.addAction(self._window.actions_[name])
-            else:
-                menu.addSeparator()
-        menu.popup(position)
+        self._session.do(commands.set_hidden, self._targets()[2], True)
 
     def size(self) -> None:
         """Ask for the catalogue size of the selected element."""
-        window = self._window
         _, result, [element_id] = self._targets()
         element = result.element(element_id)
         sizes = sizes_of(str(result.settings.elements.catalogue))
@@ -134,16 +78,16 @@ class Edits:
             ),
             names,
             here,
-            lambda i: window.do(
+            lambda i: self._session.do(
                 element_commands.set_nominal_size, element_id, sizes[i - 1] if i else None
             ),
         )
 
     def review(self, state: ReviewState) -> None:
         """Accept or reject the selected deformation, or leave it open."""
-        deformation_id = self._window.document.selection.deformation_id
+        deformation_id = self._session.document.selection.deformation_id
         if deformation_id:
-            self._window.do(commands.set_review, [deformation_id], state)
+            self._session.do(commands.set_review, [deformation_id], state)
 
     # In the background
 
@@ -161,11 +105,10 @@ class Edits:
 
     def split(self) -> None:
         """Ask where to split the selected element."""
-        window = self._window
         _, result, [element_id] = self._targets()
         element = result.element(element_id)
         length = element.axis.length
-        dialog = QInputDialog(window)
+        dialog = QInputDialog(self._window)
         dialog.setWindowTitle(tr("Split element"))
         dialog.setInputMode(QInputDialog.InputMode.DoubleInput)
         dialog.setLabelText(
@@ -182,7 +125,7 @@ class Edits:
 
     def _shown_chainage(self, result: Result, otherwise: float) -> float:
         """Chainage of the selected profile or deformation."""
-        selection = self._window.document.selection
+        selection = self._session.document.selection
         if selection.profile is not None:
             rows = result.profiles.of_element(selection.element_id, selection.profile.stack_id)
             return float(rows.chainage[rows.profile_index == selection.profile.profile_index][0])
@@ -234,7 +177,7 @@ class Edits:
         names = ", ".join(label_of(result.element(i)) for i in ids[:3]) + (
             "…" if len(ids) > 3 else ""
         )
-        settings = self._window.document.settings
+        settings = self._session.document.settings
 
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
             progress.expect(STAGES)
@@ -253,7 +196,7 @@ class Edits:
         from pipecore import editing  # noqa: PLC0415 - loads numba
         from pipecore.pipeline import STAGES  # noqa: PLC0415
 
-        box, settings = self._window.document.view.clip_box, self._window.document.settings
+        box, settings = self._session.document.view.clip_box, self._session.document.settings
         assert box is not None
 
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
@@ -265,11 +208,10 @@ class Edits:
             tr("Detecting in the box"), tr("Detect again in the box"), change, expected=False
         )
 
-    def take(self, edited: Edited) -> None:
-        """Take what was worked out, unless the result has been changed meanwhile."""
-        window = self._window
-        if element_commands.place_of(window.document, edited.cloud, edited.before) is None:
-            window.panels.message.tell(
+    def on_edited(self, edited: Edited) -> None:
+        """Take an edit that ran in the background, unless the result was changed meanwhile."""
+        if element_commands.place_of(self._session.document, edited.cloud, edited.before) is None:
+            self._session.tell(
                 tr(
                     "“{text}” was dropped: the elements were changed meanwhile. Do it again."
                 ).format(text=edited.text),
@@ -277,8 +219,8 @@ class Edits:
             )
             return
         before, after = edited.before, edited.after
-        window.do(element_commands.take_edit, edited.cloud, before, after, edited.text)
-        window.panels.message.tell(
+        self._session.do(element_commands.take_edit, edited.cloud, before, after, edited.text)
+        self._session.tell(
             tr("{text}: done. {difference}")
             .format(text=edited.text, difference=_difference(before, after))
             .strip()
@@ -295,7 +237,7 @@ class Edits:
                 progress.expect(STAGES)
             return change(cloud, result, progress)
 
-        self._window.jobs.edit(title, text, cloud, result, work)
+        self._session.jobs.edit(title, text, cloud, result, work)
 
     # Asking
 

@@ -1,12 +1,15 @@
 """Asking for files: what to open, where to export to, which ones were open lately."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from PySide6.QtCore import QSettings, QStandardPaths
 from PySide6.QtWidgets import QFileDialog, QWidget
 
+from pipecore.errors import PipecoreError
 from pipecore.io import file_filter
-from pipegui.i18n.texts import tr
+from pipegui.controllers.session import Session
+from pipegui.i18n.texts import error_text, tr
 from pipegui.project.project_file import SUFFIX
 
 N_RECENT = 10
@@ -67,6 +70,27 @@ def ask_target(
     path = Path(chosen)
     settings.setValue("files/folder", str(path.parent))
     return path if path.suffix else path.with_suffix(Path(name).suffix)
+
+
+def save_as(
+    session: Session,
+    parent: QWidget,
+    title: str,
+    name: str,
+    name_filter: str,
+    write: Callable[[Path], None],
+) -> None:
+    """Ask where to write a file as `ask_target` does, write it, and say what came of it."""
+    path = ask_target(parent, session.stored, title, name, name_filter)
+    if path is None:
+        return
+    try:
+        write(path)
+    except (PipecoreError, OSError) as error:
+        text = tr("“{path}” was not saved: {error}").format(path=path, error=error_text(error))
+        session.tell(text, "error")
+    else:
+        session.tell(tr("Saved “{path}”.").format(path=path))
 
 
 def ask_report_folder(parent: QWidget, settings: QSettings, name: str) -> Path | None:

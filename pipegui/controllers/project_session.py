@@ -3,24 +3,29 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QAbstractButton, QMessageBox, QWidget
 
 from pipecore.errors import CancelledError, ReadError
 from pipegui.controllers import file_dialogs
-from pipegui.controllers.autosave import Rescue
+from pipegui.controllers.autosave import Snapshot
+from pipegui.controllers.session import Session
 from pipegui.i18n.texts import error_text, tr
 from pipegui.model.document import Document, Scan
 from pipegui.model.fingerprint import Fingerprint
 from pipegui.project.cloud_reference import CloudState
-from pipegui.project.project_file import SUFFIX, SavedProject, read_project, work_of, write_project
-from pipegui.work.job_queue import Jobs
+from pipegui.project.project_file import (
+    SUFFIX,
+    Camera,
+    SavedProject,
+    read_project,
+    work_of,
+    write_project,
+)
+from pipegui.work.job_queue import JobQueue
 from pipegui.work.worker import JobProgress
-
-if TYPE_CHECKING:
-    from pipegui.window.main_window import MainWindow
 
 Button = QMessageBox.StandardButton
 Role = QMessageBox.ButtonRole
@@ -28,54 +33,64 @@ Places = dict[int, Path]
 """Where the clouds are, by the number of their scan in the project."""
 
 
-class Projects(QObject):
+class ProjectSession(QObject):
     """Knows where the project is saved and what of it is not.
 
     Saving has a thread of its own, so that it need not wait for a detection.
+
+    Parameters
+    ----------
+    session : Session
+        Its document is the project.
+    window : QWidget
+        Questions open over it; it closes once they are answered.
+    camera : callable
+        Returns where the 3D view looks from.
     """
 
-    def __init__(self, window: "MainWindow", rescue_folder: Path | None) -> None:
-        super().__init__(window)
-        self._window = window
+    title_changed = Signal(str, bool)
+    """Name of the project, "" for none, and whether it has unsaved work."""
+    saved = Signal()
+    recovered = Signal()
+    """The copy of an earlier session was opened."""
+    camera_read = Signal(object)
+    """Where the 3D view looked from when the project was saved."""
+    recent_files_changed = Signal()
+
+    def __init__(self, session: Session, window: QWidget, camera: Callable[[], Camera]) -> None:
+        super().__init__(session)
+        self._session, self._window, self._camera = session, window, camera
         self.path: Path | None = None
         self._saved: tuple[Any, ...] = work_of(Document())
         self._may_lose = False
-        self.saving = Jobs(parent=self)
-        self.saving.failed.connect(
-            lambda message, details: window.panels.message.tell(message, "error", details)
-        )
-        self.rescue = Rescue(self, rescue_folder) if rescue_folder is not None else None
+        self.saving = JobQueue(parent=self)
+        self.saving.failed.connect(lambda message, details: session.tell(message, "error", details))
 
     # What is saved
 
     @property
-    def document(self) -> Document:
-        """What the window works on."""
-        return self._window.document
-
-    @property
     def has_unsaved_work(self) -> bool:
         """Whether something would be lost: a scan that is only looked at would not."""
-        document = self.document
+        document = self._session.document
         if work_of(document) == self._saved:
             return False
         return self.path is not None or any(scan.result for scan in document.scans)
 
+    @property
+    def name(self) -> str:
+        """What the project is called: its file's name, else that of the scan, else ""."""
+        if self.path is not None:
+            return self.path.stem
+        scan = self._session.document.scan
+        return scan.name if scan is not None else ""
+
+    def snapshot(self) -> Snapshot:
+        """Return the present state of the work."""
+        return Snapshot(self._session.document, self._camera(), self.path)
+
     def show_title(self) -> None:
-        """Say in the window's title what is worked on, and whether it is saved."""
-        scan = self.document.scan
-        name = self.path.stem if self.path is not None else scan.name if scan is not None else ""
-        self._window.setWindowTitle(f"{name}[*] – PipeGUI" if name else "PipeGUI")
-        self._window.setWindowModified(bool(name) and self.has_unsaved_work)
-
-    def camera(self) -> dict[str, list[float]]:
-        """Where the 3D view looks from."""
-        camera: dict[str, list[float]] = self._window.parts.scene.camera()
-        return camera
-
-    def tell(self, *args: Any, **kwargs: Any) -> None:
-        """Say something above the 3D view."""
-        self._window.panels.message.tell(*args, **kwargs)
+        """Bring the window's title up to date."""
+        self.title_changed.emit(self.name, self.has_unsaved_work)
 
     # Saving
 
@@ -88,11 +103,10 @@ class Projects(QObject):
 
     def save_as(self, then: Callable[[], object] = lambda: None) -> None:
         """Ask where to save, and save there."""
-        window, scan = self._window, self.document.scan
-        name = (self.path or Path(scan.name if scan is not None else "pipes")).stem + SUFFIX
+        name = (self.path or Path(self.name or "pipes")).stem + SUFFIX
         path = file_dialogs.ask_target(
-            window,
-            window.stored,
+            self._window,
+            self._session.stored,
             tr("Save project"),
             name,
             tr("Projects (*{suffix})").format(suffix=SUFFIX),
@@ -101,7 +115,7 @@ class Projects(QObject):
             self._write(path, then)
 
     def _write(self, path: Path, then: Callable[[], object]) -> None:
-        document, camera = self.document, self.camera()
+        document, camera = self._session.document, self._camera()
 
         def write(progress: JobProgress) -> None:
             write_project(path, document, camera, progress=progress)
@@ -110,16 +124,15 @@ class Projects(QObject):
             self.path, self._saved = path, work_of(document)
             self._remember(path)
             self.show_title()
-            self._window.panels.message.tell(tr("Saved “{path}”.").format(path=path))
-            if self.rescue is not None and not self.has_unsaved_work:
-                self.rescue.forget()
+            self._session.tell(tr("Saved “{path}”.").format(path=path))
+            self.saved.emit()
             then()
 
         self.saving.run(tr("Saving {name}").format(name=path.name), write, done)
 
     def _remember(self, path: Path) -> None:
-        file_dialogs.remember(self._window.stored, path)
-        self._window.menu_actions.list_recent()
+        file_dialogs.remember(self._session.stored, path)
+        self.recent_files_changed.emit()
 
     # Asking before work is lost
 
@@ -128,16 +141,14 @@ class Projects(QObject):
         if not self.has_unsaved_work:
             go_on()
             return
-        scan = self.document.scan
-        name = self.path.stem if self.path is not None else scan.name if scan is not None else ""
         box = self._question(
-            tr("Save the work on “{name}”?").format(name=name),
+            tr("Save the work on “{name}”?").format(name=self.name),
             tr("What was detected, edited and reviewed since the last save would be lost."),
         )
         box.setStandardButtons(Button.Save | Button.Discard | Button.Cancel)
         box.setDefaultButton(Button.Save)
 
-        def answer(button: Any) -> None:
+        def answer(button: QAbstractButton) -> None:
             match box.standardButton(button):
                 case Button.Save:
                     self.save(go_on)
@@ -155,18 +166,16 @@ class Projects(QObject):
         return False
 
     def _close_without(self) -> None:
-        self.discard()
+        self.discard_changes()
         self._window.close()
 
-    def discard(self) -> None:
+    def discard_changes(self) -> None:
         """Let the window close without asking."""
         self._may_lose = True
 
     def close(self) -> None:
-        """End the thread; what was autosaved is not needed after a proper end."""
+        """End the thread that saves."""
         self.saving.close()
-        if self.rescue is not None:
-            self.rescue.close()
 
     def _question(self, text: str, more: str) -> QMessageBox:
         box = QMessageBox(self._window)
@@ -180,17 +189,37 @@ class Projects(QObject):
 
     def ask_open(self) -> None:
         """Ask for a project and open it."""
-        path = file_dialogs.ask_project(self._window, self._window.stored)
+        path = file_dialogs.ask_project(self._window, self._session.stored)
         if path is not None:
             self.open(path)
 
     def open(self, path: Path) -> None:
         """Open a project in the place of what is open."""
-        self.ask_before(lambda: self._ask_to_stop(path, lambda: self._open(path)))
+        self._open_after_asking(path, self._show)
+
+    def recover(self, path: Path) -> None:
+        """Open the copy that an earlier session left."""
+        self._open_after_asking(path, self._show_recovered)
+
+    def _open_after_asking(self, path: Path, show: "Show") -> None:
+        def work(progress: JobProgress) -> SavedProject:
+            return read_project(path, progress)
+
+        def located(saved: SavedProject, places: Places) -> None:
+            self._read_clouds(saved, places, show)
+
+        def read() -> None:
+            self._session.jobs.run(
+                tr("Opening {name}").format(name=path.name),
+                work,
+                lambda saved: self._locate(saved, located),
+            )
+
+        self.ask_before(lambda: self._ask_to_stop(path, read))
 
     def _ask_to_stop(self, path: Path, go_on: Callable[[], object]) -> None:
         """Ask before work is stopped whose scans go; nobody should have to wait for it."""
-        jobs = self._window.jobs
+        jobs = self._session.jobs
         if not jobs.is_busy:
             go_on()
             return
@@ -202,7 +231,7 @@ class Projects(QObject):
         box.addButton(Button.Cancel)
         box.setDefaultButton(stop)
 
-        def answer(button: Any) -> None:
+        def answer(button: QAbstractButton) -> None:
             if button is stop:
                 jobs.cancel()
                 go_on()
@@ -210,13 +239,7 @@ class Projects(QObject):
         box.buttonClicked.connect(answer)
         box.open()
 
-    def _open(self, path: Path) -> None:
-        def work(progress: JobProgress) -> SavedProject:
-            return read_project(path, progress)
-
-        self._window.jobs.run(tr("Opening {name}").format(name=path.name), work, self._locate)
-
-    def _locate(self, saved: SavedProject) -> None:
+    def _locate(self, saved: SavedProject, located: Callable[[SavedProject, Places], None]) -> None:
         """Have the user find the clouds that are not where they were, one after the other."""
         places: Places = {}
         doubtful = []
@@ -230,7 +253,7 @@ class Projects(QObject):
             if doubtful:
                 self._ask_place(saved, *doubtful.pop(0), places, next_one)
             else:
-                self._read_clouds(saved, places)
+                located(saved, places)
 
         next_one()
 
@@ -255,9 +278,9 @@ class Projects(QObject):
         box.addButton(Button.Cancel)
         box.setDefaultButton(locate)
 
-        def answer(button: Any) -> None:
+        def answer(button: QAbstractButton) -> None:
             if button is locate:
-                chosen = file_dialogs.ask_scan(self._window, self._window.stored, name)
+                chosen = file_dialogs.ask_scan(self._window, self._session.stored, name)
                 if chosen is None:
                     self._ask_place(saved, number, path, state, places, go_on)
                     return
@@ -271,8 +294,8 @@ class Projects(QObject):
         box.buttonClicked.connect(answer)
         box.open()
 
-    def _read_clouds(self, saved: SavedProject, places: Places) -> None:
-        read = self._window.jobs.read
+    def _read_clouds(self, saved: SavedProject, places: Places, show: "Show") -> None:
+        read = self._session.jobs.read
 
         def work(progress: JobProgress) -> tuple[Scan, ...]:
             scans = []
@@ -290,37 +313,41 @@ class Projects(QObject):
                 scans.append(scan.with_cloud(replace(cloud, source=path), fingerprint))
             return tuple(scans)
 
-        self._window.jobs.run(
+        self._session.jobs.run(
             tr("Reading the scans of {name}").format(name=saved.path.name),
             work,
-            lambda scans: self._show(saved, scans),
+            lambda scans: show(saved, scans),
         )
 
     def _show(self, saved: SavedProject, scans: tuple[Scan, ...]) -> None:
-        window = self._window
-        is_whole, is_rescued = len(scans) == len(saved.scans), self._is_rescued(saved)
+        """Show a project that was opened."""
+        is_whole = len(scans) == len(saved.scans)
         document = saved.document(scans)
         # What is not as in the file is not saved, and does not take the file's place unasked.
         self.path = saved.path if is_whole else None
-        if is_rescued:
-            self.path = saved.rescued_from
-        self._saved = work_of(document) if is_whole and not is_rescued else ()
-        window.history.reset(document)
-        if saved.camera:
-            window.parts.scene.set_camera(saved.camera)
-        window.menu_actions.list_history()
-        self.show_title()
-        if is_rescued and self.rescue is not None:
-            self.rescue.take_over()
-            self.tell(tr("The unsaved work was restored. Save it now."), "warning")
-            return
+        self._replace_document(document, saved.camera, is_saved=is_whole)
         self._remember(saved.path)
         if is_whole:
-            window.panels.message.tell(tr("Opened “{path}”.").format(path=saved.path))
+            self._session.tell(tr("Opened “{path}”.").format(path=saved.path))
         else:
-            window.panels.message.tell(
+            self._session.tell(
                 tr("Some scans were left out; “Save” will ask for another file."), "warning"
             )
 
-    def _is_rescued(self, saved: SavedProject) -> bool:
-        return self.rescue is not None and self.rescue.is_restoring(saved.path)
+    def _show_recovered(self, saved: SavedProject, scans: tuple[Scan, ...]) -> None:
+        """Show the unsaved work of an earlier session; it belongs to the project it was of."""
+        self.path = saved.recovered_from
+        self._replace_document(saved.document(scans), saved.camera, is_saved=False)
+        self.recovered.emit()
+        self._session.tell(tr("The unsaved work was restored. Save it now."), "warning")
+
+    def _replace_document(self, document: Document, camera: Camera, *, is_saved: bool) -> None:
+        self._saved = work_of(document) if is_saved else ()
+        self._session.history.reset(document)
+        if camera:
+            self.camera_read.emit(camera)
+        self.show_title()
+
+
+Show = Callable[[SavedProject, tuple[Scan, ...]], None]
+"""Shows a project with its scans, those left out excepted."""

@@ -1,7 +1,7 @@
 """What the user chose to see in plots and table, kept from one session to the next.
 
-A part that has choices gives them as plain values, and takes them again. They are kept as
-JSON, since a file of settings knows no lists of one or none.
+A view with preferences returns them as plain values, and takes them again. They are stored
+as JSON, since an INI file cannot hold lists of one item or none.
 """
 
 import json
@@ -13,8 +13,8 @@ from PySide6.QtCore import QSettings, SignalInstance
 from PySide6.QtWidgets import QTabWidget
 
 
-class Chooser(Protocol):
-    """A part of the window with choices."""
+class HasPreferences(Protocol):
+    """A view whose choices are remembered."""
 
     choices_changed: SignalInstance
 
@@ -23,28 +23,28 @@ class Chooser(Protocol):
         ...
 
     def choose(self, choices: Mapping[str, Any]) -> None:
-        """Take choices; what is unknown or does not fit is passed over."""
+        """Take choices; unknown and invalid ones are ignored."""
         ...
 
 
-def keep(stored: QSettings, parts: Mapping[str, Chooser]) -> None:
-    """Give each part the choices of last time, and keep those to come under its name."""
-    for name, part in parts.items():
+def remember_choices(stored: QSettings, views: Mapping[str, HasPreferences]) -> None:
+    """Give each view its stored choices, and store those to come under its name."""
+    for name, view in views.items():
         key = f"choices/{name}"
         choices: Any = None
         with suppress(ValueError):
             choices = json.loads(str(stored.value(key, "")))
         if isinstance(choices, dict):
-            part.choose(choices)
+            view.choose(choices)
 
-        def remember(part: Chooser = part, key: str = key) -> None:
-            stored.setValue(key, json.dumps(part.choices()))
+        def store(view: HasPreferences = view, key: str = key) -> None:
+            stored.setValue(key, json.dumps(view.choices()))
 
-        part.choices_changed.connect(remember)
+        view.choices_changed.connect(store)
 
 
-def keep_tab(stored: QSettings, tabs: QTabWidget) -> None:
-    """Show the tab that was shown last time, and remember which one is."""
+def remember_tab(stored: QSettings, tabs: QTabWidget) -> None:
+    """Show the tab shown last time, and store which one is shown from now on."""
     key = f"choices/{tabs.objectName()}"
     with suppress(ValueError):
         tabs.setCurrentIndex(int(str(stored.value(key, 0))))

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from numpy.typing import NDArray
+
 from pipegui.model.commands import after_undo
 from pipegui.model.document import Document
 
@@ -114,7 +116,7 @@ class History:
 
 def _arrays_of(document: Document) -> dict[int, int]:
     """Sizes in bytes of a document's arrays by point, by what tells them apart."""
-    arrays = []
+    arrays: list[NDArray[Any]] = []
     for scan in document.scans:
         arrays.append(scan.cloud.xyz)
         if scan.result is not None:

@@ -116,7 +116,7 @@ def reviews_carried_over(
     """Return what was said of deformations for those that are found again."""
     if old is None or old is new:
         return reviews
-    kept = {}
+    kept: dict[int, Review] = {}
     for deformation_id, review in sorted(reviews.items()):
         deformation = old.deformation(deformation_id)
         twin = _same_element(old.element(deformation.element_id), new)

@@ -101,6 +101,12 @@ def delete_measurements(document: Document) -> Document:
     return set_view(document, measurements=(), measuring_from=None)
 
 
+def end_measuring(document: Document) -> Document:
+    """Delete the last measurement, and put the measuring tool away if it is chosen."""
+    document = delete_measurement(document, -1)
+    return choose_tool(document, Tool.MEASURE) if document.view.tool is Tool.MEASURE else document
+
+
 def _point(document: Document, point_index: int) -> Point:
     assert document.scan is not None
     east, north, height = document.scan.cloud.xyz[point_index].tolist()
@@ -194,9 +200,9 @@ def extent(cloud: PointCloud) -> tuple[Array, Array]:
 def _outline(element: Element, start: float, end: float) -> Array:
     """Points around a stretch of an element, shape (n, 3)."""
     clock = np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    s, clock = np.meshgrid(np.linspace(start, end, 16), clock)
-    s = s.ravel()
-    return surface_points(element.axis, s, element.radius_at(s), clock.ravel())
+    along, around = np.meshgrid(np.linspace(start, end, 16), clock)
+    s = along.ravel()
+    return surface_points(element.axis, s, element.radius_at(s), around.ravel())
 
 
 def _triple(values: Array) -> Point:

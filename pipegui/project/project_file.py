@@ -108,7 +108,7 @@ class SavedProject:
     selection: Selection = Selection()
     view: ViewOptions = ViewOptions()
     camera: Camera = field(default_factory=dict)
-    rescued_from: Path | None = None
+    recovered_from: Path | None = None
     """The project that an autosaved one belongs to."""
 
     def located(self) -> list[tuple[Path, CloudState]]:
@@ -139,7 +139,7 @@ def write_project(
     path: Path,
     document: Document,
     camera: Camera | None = None,
-    rescued_from: Path | None = None,
+    recovered_from: Path | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write a project: the whole file or nothing.
@@ -159,7 +159,7 @@ def write_project(
         "format_version": FORMAT_VERSION,
         "program": pipecore.__version__,
         "saved": datetime.now(UTC).isoformat(timespec="seconds"),
-        "rescued_from": to_plain(rescued_from),
+        "rescued_from": to_plain(recovered_from),
         "active": document.active,
         "settings": to_plain(document.settings),
         "selection": to_plain(document.selection),
@@ -183,10 +183,10 @@ def _write_array(file: Any, array: NDArray[Any], progress: Progress, done: float
     array = np.ascontiguousarray(array)
     header = np.lib.format.header_data_from_array_1_0(array)
     np.lib.format.write_array_header_1_0(file, header)
-    data = memoryview(array.reshape(-1).view(np.uint8)) if array.size else b""
+    data = array.reshape(-1).view(np.uint8)
     for start in range(0, len(data), 1 << 22):
         progress.update("saving", done)
-        file.write(data[start : start + (1 << 22)])
+        file.write(data[start : start + (1 << 22)].data)
 
 
 def _scan_to_plain(scan: Scan, folder: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from pipegui.window.command_palette import Entry
 class Actions:
     """The window's `QAction`s by name, in its menus."""
 
-    def __init__(self, window: QMainWindow, handlers: Mapping[str, Callable[..., object]]) -> None:
+    def __init__(self, window: QMainWindow) -> None:
         self.menus: dict[str, QMenu] = {}
         self._actions: dict[str, QAction] = {}
         for name, specs in MENUS.items():
@@ -24,13 +24,25 @@ class Actions:
                     menu.addSeparator()
                     continue
                 self._actions[spec.name] = action = _make(spec, window)
-                # `triggered` hands over a check mark, which only check boxes care for.
-                handler = handlers[spec.name]
-                if spec.is_checkable:
-                    action.toggled.connect(handler)
-                else:
-                    action.triggered.connect(lambda _=False, handler=handler: handler())
                 (self._submenu(menu, spec.submenu) if spec.submenu else menu).addAction(action)
+
+    def connect(self, handlers: Mapping[str, Callable[..., object]]) -> None:
+        """Call a handler when its action is triggered; those with a check mark get it as `bool`.
+
+        Parameters
+        ----------
+        handlers : mapping
+            One for each action, by the action's name.
+        """
+        for spec in SPECS:
+            handler = handlers[spec.name]
+            if spec.is_checkable:
+                self._actions[spec.name].toggled.connect(handler)
+            else:
+                # `triggered` hands over a check mark all the same.
+                self._actions[spec.name].triggered.connect(
+                    lambda _=False, handler=handler: handler()
+                )
 
     def _submenu(self, menu: QMenu, title: str) -> QMenu:
         if title not in self.menus:
@@ -50,7 +62,7 @@ class Actions:
         ]
 
     def update(self, conditions: Mapping[str, bool]) -> None:
-        """Enable what makes sense now."""
+        """Enable the actions whose needs are met."""
         for spec in SPECS:
             self._actions[spec.name].setEnabled(
                 all(conditions[need] for need in spec.needs.split())

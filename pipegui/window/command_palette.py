@@ -1,4 +1,4 @@
-"""Command search: find an action by a few letters of its name, and carry it out."""
+"""The command palette: find an action by a few letters of its name, and run it."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -14,35 +14,35 @@ WIDTH, ROWS = 60 * SPACING, 10
 
 
 @dataclass(frozen=True)
-class Found:
-    """How well an action fits what was typed: lower is better."""
+class MatchRank:
+    """How well an action matches what was typed: lower is better."""
 
     gaps: int
     start: int
 
 
-def match(typed: str, text: str) -> Found | None:
+def match(typed: str, text: str) -> MatchRank | None:
     """Whether the letters of `typed` occur in `text` in their order, and how scattered.
 
     Letters that begin words count as less scattered than others: "sa" ranks "Show all"
     before "Isolate". Case and spaces do not matter.
     """
     wanted = "".join(typed.lower().split())
-    heard = text.lower()
+    lower = text.lower()
     if not wanted:
-        return Found(0, 0)
-    best: Found | None = None
-    for first in (i for i, letter in enumerate(heard) if letter == wanted[0]):
-        place, gaps = first, 0 if _begins_word(heard, first) else 1
+        return MatchRank(0, 0)
+    best: MatchRank | None = None
+    for first in (i for i, letter in enumerate(lower) if letter == wanted[0]):
+        place, gaps = first, 0 if _begins_word(lower, first) else 1
         for letter in wanted[1:]:
-            following = heard.find(letter, place + 1)
+            following = lower.find(letter, place + 1)
             if following < 0:
                 break
             if following > place + 1:
-                gaps += 1 if _begins_word(heard, following) else 2
+                gaps += 1 if _begins_word(lower, following) else 2
             place = following
         else:
-            found = Found(gaps, first)
+            found = MatchRank(gaps, first)
             if best is None or (found.gaps, found.start) < (best.gaps, best.start):
                 best = found
     return best
@@ -65,22 +65,22 @@ class Entry:
         return self.action.text().replace("&", "")
 
 
-class CommandSearch(QFrame):
-    """A field over a list of actions; typed letters narrow it down, Return carries out.
+class CommandPalette(QFrame):
+    """A field over a list of actions; typed letters filter it, Return runs the chosen one.
 
     Parameters
     ----------
     parent : QWidget
         The window over whose upper edge it opens.
     entries : callable
-        Gives all actions with their menus' names; asked each time it opens.
+        Returns all actions with their menus' names; called whenever the list is filtered.
     """
 
     def __init__(self, parent: QWidget, entries: Callable[[], Iterable[Entry]]) -> None:
         super().__init__(parent, Qt.WindowType.Popup)
         self.setObjectName("command_search")
         self.setFrameShape(QFrame.Shape.StyledPanel)
-        self._entries = entries
+        self._window, self._entries = parent, entries
         self.field = QLineEdit()
         self.field.setPlaceholderText(tr("Search actions"))
         self.field.setAccessibleName(tr("Search actions"))
@@ -97,22 +97,22 @@ class CommandSearch(QFrame):
         layout.setContentsMargins(SPACING, SPACING, SPACING, SPACING)
         layout.addWidget(self.field)
         layout.addWidget(self.list)
-        self.field.textChanged.connect(self._narrow)
+        self.field.textChanged.connect(self._filter)
         self.field.installEventFilter(self)
         self.list.itemClicked.connect(self._run)
 
     def open(self) -> None:
         """Show all actions under an empty field."""
-        window = self.parentWidget()
+        window = self._window
         self.resize(WIDTH, self.field.sizeHint().height() + ROWS * 3 * SPACING + 4 * SPACING)
         corner = QPoint((window.width() - self.width()) // 2, 6 * SPACING)
         self.move(window.mapToGlobal(corner))
         self.field.clear()
-        self._narrow("")
+        self._filter("")
         self.show()
         self.field.setFocus()
 
-    def _narrow(self, typed: str) -> None:
+    def _filter(self, typed: str) -> None:
         ranked = []
         for i, entry in enumerate(self._entries()):
             found = match(typed, entry.name) or match(typed, f"{entry.menu} {entry.name}")
@@ -132,7 +132,7 @@ class CommandSearch(QFrame):
             item = QTreeWidgetItem([tr("No action is called that"), "", ""])
             item.setDisabled(True)
             self.list.addTopLevelItem(item)
-        self.list.setCurrentItem(self.list.topLevelItem(0))
+        self._choose_row(0)
         self.list.setColumnWidth(0, 34 * SPACING)
         self.list.setColumnWidth(1, 9 * SPACING)
 
@@ -156,9 +156,15 @@ class CommandSearch(QFrame):
         return super().eventFilter(watched, event)
 
     def _step(self, by: int) -> None:
-        row = self.list.indexOfTopLevelItem(self.list.currentItem()) + by
-        row = min(max(row, 0), self.list.topLevelItemCount() - 1)
-        self.list.setCurrentItem(self.list.topLevelItem(row))
+        item = self.list.currentItem()
+        if item is not None:
+            self._choose_row(self.list.indexOfTopLevelItem(item) + by)
+
+    def _choose_row(self, row: int) -> None:
+        """Choose a row, or the first or last if there is none of that number."""
+        item = self.list.topLevelItem(min(max(row, 0), self.list.topLevelItemCount() - 1))
+        if item is not None:
+            self.list.setCurrentItem(item)
 
 
 def _key_of(action: QAction) -> str:

@@ -1,10 +1,9 @@
-"""Where everything stands in the main window, as UI drawings have it."""
+"""The docks: which panel and plot stands where in the main window."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
 
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QDockWidget, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtCore import QSettings, Qt, QTimer
+from PySide6.QtWidgets import QDockWidget, QMainWindow, QMenu, QTabWidget, QWidget
 
 from pipegui.i18n.texts import mark, tr
 from pipegui.panels.clip_bar import ClipBar
@@ -16,9 +15,7 @@ from pipegui.panels.properties import PropertiesPanel
 from pipegui.panels.settings_form import SettingsForm
 from pipegui.panels.stacks_panel import StacksPanel
 from pipegui.panels.welcome import Welcome
-
-if TYPE_CHECKING:
-    from pipegui.window.main_window import MainWindow
+from pipegui.window.views import Views
 
 LEFT = Qt.DockWidgetArea.LeftDockWidgetArea
 RIGHT = Qt.DockWidgetArea.RightDockWidgetArea
@@ -39,8 +36,10 @@ class Panels:
     welcome: Welcome
     clip: ClipBar
     profiles: ProfileBar
-    docks: dict[str, QDockWidget]
-    plots: QTabWidget | None = None
+    plots: QTabWidget
+    """The plots, a tab each."""
+    docks: dict[str, QDockWidget] = field(default_factory=dict)
+    """By their titles in English."""
 
     @classmethod
     def make(cls) -> "Panels":
@@ -55,100 +54,107 @@ class Panels:
             Welcome(),
             ClipBar(),
             ProfileBar(),
-            {},
+            QTabWidget(),
         )
 
     def show_plot(self, widget: QWidget) -> None:
         """Bring a plot forward."""
-        assert self.plots is not None
-        self.docks["Element"].show()
-        self.docks["Element"].raise_()
+        self._raise("Element")
         self.plots.setCurrentWidget(widget)
 
     def open_stack_editor(self) -> None:
         """Bring the stacks panel forward with its editor open."""
-        self.docks["Stacks"].show()
-        self.docks["Stacks"].raise_()
+        self._raise("Stacks")
         self.stacks.add()
 
+    def rename_in_tree(self) -> None:
+        """Bring the project tree forward, and let the user name what is selected in it."""
+        self._raise("Project")
+        self.tree.rename()
 
-def arrange(window: "MainWindow") -> None:
-    """Place the panels and views in docks around the centre, as they were left last time."""
-    panels, parts = window.panels, window.parts
+    def _raise(self, title: str) -> None:
+        self.docks[title].show()
+        self.docks[title].raise_()
+
+
+def arrange(window: QMainWindow, panels: Panels, views: Views, panel_menu: QMenu) -> None:
+    """Put the panels and plots into docks around the window's centre.
+
+    Parameters
+    ----------
+    window : QMainWindow
+        Takes the docks.
+    panels, views : Panels, Views
+        What is put into them; `panels.docks` is filled.
+    panel_menu : QMenu
+        Takes an action for each dock that shows or hides it.
+    """
     window.setDockOptions(
-        window.DockOption.AllowTabbedDocks
-        | window.DockOption.AllowNestedDocks
-        | window.DockOption.AnimatedDocks
+        QMainWindow.DockOption.AllowTabbedDocks
+        | QMainWindow.DockOption.AllowNestedDocks
+        | QMainWindow.DockOption.AnimatedDocks
     )
     window.setTabPosition(LEFT, QTabWidget.TabPosition.North)
     window.setCorner(Qt.Corner.BottomLeftCorner, LEFT)
     window.setCorner(Qt.Corner.BottomRightCorner, BOTTOM)
+    _fill_tabs(panels.plots, views)
+    for title, widget, area in (
+        (mark("Project"), panels.tree, LEFT),
+        (mark("Stacks"), panels.stacks, LEFT),
+        (mark("Settings"), panels.settings, LEFT),
+        (mark("Element"), panels.plots, RIGHT),
+        (mark("Properties"), panels.properties, RIGHT),
+        (mark("Deformations"), panels.table, BOTTOM),
+    ):
+        dock = QDockWidget(tr(title), window)
+        dock.setObjectName(title)
+        dock.setWidget(widget)
+        panels.docks[title] = dock
+        window.addDockWidget(area, dock)
+    window.tabifyDockWidget(panels.docks["Stacks"], panels.docks["Settings"])
+    panels.docks["Stacks"].raise_()
+    panel_menu.addSeparator()
+    for dock in panels.docks.values():
+        panel_menu.addAction(dock.toggleViewAction())
 
-    window.centre.addWidget(panels.welcome)
-    window.centre.addWidget(parts.scene)
-    centre = QWidget()
-    column = QVBoxLayout(centre)
-    column.setContentsMargins(0, 0, 0, 0)
-    column.setSpacing(0)
-    column.addWidget(panels.message)
-    column.addWidget(window.centre, 1)
-    column.addWidget(panels.profiles)
-    column.addWidget(panels.clip)
-    window.setCentralWidget(centre)
 
-    panels.plots = plots = QTabWidget()
+def _fill_tabs(plots: QTabWidget, views: Views) -> None:
     plots.setObjectName("plots")
     plots.setDocumentMode(True)
-    for title, widget in (
-        (tr("Radius"), parts.radius_plot),
-        (tr("Map"), parts.map),
-        (tr("Section"), parts.section),
-        (tr("Preview"), parts.preview),
-    ):
-        plots.addTab(widget, title)
+    plots.addTab(views.radius_plot, tr("Radius"))
+    plots.addTab(views.map, tr("Map"))
+    plots.addTab(views.section, tr("Section"))
+    plots.addTab(views.preview, tr("Preview"))
     # A click on a tab means the plot: the arrow keys are then its own, not the tabs'.
     plots.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)
-    plots.tabBarClicked.connect(lambda i: plots.widget(i).setFocus() if i >= 0 else None)
 
-    _dock(window, mark("Project"), panels.tree, LEFT)
-    _dock(window, mark("Stacks"), panels.stacks, LEFT)
-    _dock(window, mark("Settings"), panels.settings, LEFT)
-    _dock(window, mark("Element"), plots, RIGHT)
-    _dock(window, mark("Properties"), panels.properties, RIGHT)
-    _dock(window, mark("Deformations"), panels.table, BOTTOM)
-    docks = panels.docks
-    window.tabifyDockWidget(docks["Stacks"], docks["Settings"])
-    docks["Stacks"].raise_()
+    def focus(i: int) -> None:
+        if (plot := plots.widget(i)) is not None:
+            plot.setFocus()
 
-    panel_menu = window.actions_.menus["Panels"]
-    panel_menu.addSeparator()
-    for dock in docks.values():
-        panel_menu.addAction(dock.toggleViewAction())
-    _restore(window)
+    plots.tabBarClicked.connect(focus)
 
 
-def _dock(window: "MainWindow", title: str, widget: QWidget, area: Qt.DockWidgetArea) -> None:
-    dock = QDockWidget(tr(title), window)
-    dock.setObjectName(title)
-    dock.setWidget(widget)
-    window.panels.docks[title] = dock
-    window.addDockWidget(area, dock)
-
-
-def _restore(window: "MainWindow") -> None:
-    geometry, state = (window.stored.value(f"window/{name}") for name in ("geometry", "state"))
+def restore_layout(window: QMainWindow, docks: dict[str, QDockWidget], stored: QSettings) -> None:
+    """Place window and docks as they were left last time, else as suits the screen."""
+    geometry, state = (stored.value(f"window/{name}") for name in ("geometry", "state"))
     if geometry is None or not window.restoreGeometry(geometry):
         available = window.screen().availableGeometry()
         window.resize(min(1600, available.width()), min(1000, available.height()))
     if state is not None and window.restoreState(state, LAYOUT_VERSION):
         return
     # Docks take sizes only once the window has been laid out.
-    QTimer.singleShot(0, window, lambda: _set_default_sizes(window))
+    QTimer.singleShot(0, window, lambda: _set_default_sizes(window, docks))
 
 
-def _set_default_sizes(window: "MainWindow") -> None:
+def store_layout(window: QMainWindow, stored: QSettings) -> None:
+    """Store where window and docks are."""
+    stored.setValue("window/geometry", window.saveGeometry())
+    stored.setValue("window/state", window.saveState(LAYOUT_VERSION))
+
+
+def _set_default_sizes(window: QMainWindow, docks: dict[str, QDockWidget]) -> None:
     width, height = window.width(), window.height()
-    docks = window.panels.docks
     across, down = Qt.Orientation.Horizontal, Qt.Orientation.Vertical
     sides = [max(248, width * 17 // 100), max(328, width * 27 // 100)]
     window.resizeDocks([docks["Project"], docks["Element"]], sides, across)

@@ -1,303 +1,218 @@
-"""The main window: signals of the parts become commands, states go back to the parts."""
+"""The main window: views, panels, actions and bars in their places.
 
-from collections.abc import Callable
+It shows what it is given and reports what the user does; what that means is not decided here.
+"""
+
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
-from PySide6.QtCore import QSettings
-from PySide6.QtGui import QCloseEvent, QCursor, QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QApplication, QMainWindow, QStackedWidget, QToolTip
+from PySide6.QtCore import QSettings, Signal
+from PySide6.QtGui import (
+    QCloseEvent,
+    QCursor,
+    QDragEnterEvent,
+    QDragLeaveEvent,
+    QDropEvent,
+)
+from PySide6.QtWidgets import QMainWindow, QStackedWidget, QToolTip, QVBoxLayout, QWidget
 
-from pipecore.errors import PipecoreError
-from pipecore.types import PointCloud, Result
-from pipegui import connections as wiring
-from pipegui.controllers import file_dialogs
-from pipegui.controllers.element_edits import Edits, conditions
-from pipegui.controllers.exports import MenuActions
-from pipegui.controllers.project_session import Projects
-from pipegui.i18n.texts import error_text, inside, tr
-from pipegui.model import commands
-from pipegui.model.document import Background, ColourBy, Document, Scan, Tool
-from pipegui.model.history import History
-from pipegui.panels.project_tree import NodeKind
+from pipecore.types import PointCloud
+from pipegui.i18n.texts import inside, tr
+from pipegui.model.document import Background, Tool
 from pipegui.panels.status import StatusBar
-from pipegui.project.project_file import SUFFIX
 from pipegui.states import descriptions
-from pipegui.states.view_state import PropertiesState, ViewState, WindowState, resolve
+from pipegui.states.view_state import PropertiesState, WindowState
 from pipegui.style import theme
+from pipegui.window.about import show_about
 from pipegui.window.action_table import VIEW_OPTIONS
 from pipegui.window.actions import Actions
-from pipegui.window.docks import LAYOUT_VERSION, Panels, arrange
+from pipegui.window.command_palette import CommandPalette
+from pipegui.window.docks import Panels, arrange, restore_layout, store_layout
+from pipegui.window.list_menus import HistoryMenu, RecentFilesMenu
+from pipegui.window.panel_focus import RaiseFocusedDock, go_to_next_panel
+from pipegui.window.shortcut_list import ShortcutList
 from pipegui.window.toolbar import ToolBar
-from pipegui.window.views import Parts
-from pipegui.work.job_queue import Jobs
-from pipegui.work.previews import Previews
+from pipegui.window.views import Views
 
 
 class MainWindow(QMainWindow):
-    """Holds the history; every part hears only of what changed for it.
+    """The shell around the views.
 
     Parameters
     ----------
-    parts : Parts
+    views : Views
         The 3D view and the plots.
-    jobs : Jobs
-        Reads and detects.
     stored : QSettings
-        Keeps the window's layout and the recent files.
-    rescue : Path, optional
-        Folder for copies of unsaved work.
+        Where the layout is kept from one start to the next.
     """
 
-    def __init__(
-        self, parts: Parts, jobs: Jobs, stored: QSettings, rescue: Path | None = None
-    ) -> None:
+    files_dropped = Signal(list)
+    """Paths of files."""
+    closing = Signal()
+    """The window closes now: work in the background has to end."""
+
+    def __init__(self, views: Views, stored: QSettings) -> None:
         super().__init__()
         self.setObjectName("pipegui")
         self.setWindowTitle("PipeGUI")
         self.setAcceptDrops(True)
-        self.parts, self.jobs, self.stored = parts, jobs, stored
-        # Qt's connections hold on to the window in a way that Python does not see: they
-        # go with the jobs, and the jobs with the window.
-        jobs.setParent(self)
-        self.history = History(changed=self._show)
-        self._state = ViewState()
+        self.views, self._stored = views, stored
+        self.may_close: Callable[[], bool] = lambda: True
+        """Asked before the window closes; may open a question and say no."""
         self.panels = Panels.make()
-        self.previews = Previews(jobs, self)
-        self.menu_actions = MenuActions(self)
-        self.edits = Edits(self)
-        self.projects = Projects(self, rescue)
-        self.actions_ = Actions(self, wiring.handlers(self))
+        self.actions_ = Actions(self)
         self.tool_bar = ToolBar(self.actions_)
         self.addToolBar(self.tool_bar)
         self.status = StatusBar()
         self.setStatusBar(self.status)
         self.centre = QStackedWidget()
-        arrange(self)
-        self.menu_actions.list_recent()
-        self.menu_actions.list_history()
-        wiring.connect_panels(self)
-        wiring.connect_views(self)
-        wiring.connect_previews(self)
-        wiring.connect_jobs(self)
-        wiring.keep_choices(self)
-        QApplication.styleHints().colorSchemeChanged.connect(self.refresh_colours)
-        self._apply(resolve(self.history.document), everything=True)
-        self.menu_actions.restore_appearance()
-        self.menu_actions.show_language()
+        self._place_centre()
+        arrange(self, self.panels, views, self.actions_.menus["Panels"])
+        restore_layout(self, self.panels.docks, stored)
+        self.recent_files, self.history_menu = RecentFilesMenu(self), HistoryMenu(self)
+        file_menu, save = self.actions_.menus["File"], self.actions_["save"]
+        file_menu.insertMenu(save, self.recent_files)
+        file_menu.insertSeparator(save)
+        self.actions_.menus["Edit"].insertMenu(self.actions_["go_up"], self.history_menu)
+        self._palette: CommandPalette | None = None
+        self._has_scan = False
+        RaiseFocusedDock(self.panels.docks.values(), self)
 
-    @property
-    def document(self) -> Document:
-        """The present document."""
-        return self.history.document
+    def _place_centre(self) -> None:
+        panels = self.panels
+        self.centre.addWidget(panels.welcome)
+        self.centre.addWidget(self.views.scene)
+        column = QVBoxLayout(centre := QWidget())
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(panels.message)
+        column.addWidget(self.centre, 1)
+        column.addWidget(panels.profiles)
+        column.addWidget(panels.clip)
+        self.setCentralWidget(centre)
 
-    def do(self, command: Callable[..., Document], *args: Any, **kwargs: Any) -> None:
-        """Carry out a command; what it objects to is told, and nothing changes."""
-        try:
-            self.history.do(command, *args, **kwargs)
-        except PipecoreError as error:
-            self.panels.message.tell(error_text(error), "warning")
-            self._apply(self._state, everything=True)
+    # What it is given to show
 
-    # Work
-
-    def open_files(self, paths: list[Path]) -> None:
-        """Read scans in the background; of projects there is one at a time."""
-        projects = [path for path in paths if path.suffix == SUFFIX]
-        if projects:
-            self.projects.open(projects[0])
-        self.jobs.open_files([p for p in paths if p not in projects], self.document.settings)
-
-    def detect(self) -> None:
-        """Detect on the active scan in the background."""
-        # A number still being typed counts: it becomes a setting when its field is left.
-        if (field := self.focusWidget()) is not None:
-            field.clearFocus()
-        if self.document.scan is not None:
-            self.jobs.detect(self.document.scan.cloud, self.document.settings)
-
-    def show_glimpse(self, part: PointCloud) -> None:
-        """Show what was read so far, unless another scan is looked at."""
-        if self.document.scan is None:
-            self.centre.setCurrentWidget(self.parts.scene)
-            self.parts.scene.glimpse(part)
-
-    def end_glimpse(self) -> None:
-        """What was read comes as a scan now, or not at all."""
-        self.parts.scene.end_glimpse()
-        if self.document.scan is None:
-            self.centre.setCurrentWidget(self.panels.welcome)
-
-    def take_scan(self, scan: Scan) -> None:
-        """Add a scan that was read."""
-        self.panels.message.hide()
-        self.do(commands.open_scan, scan)
-        if scan.cloud.source is not None:
-            file_dialogs.remember(self.stored, scan.cloud.source)
-            self.menu_actions.list_recent()
-
-    def take_result(self, cloud: PointCloud, result: Result) -> None:
-        """Show what was detected, and say it in a line."""
-        self.do(commands.set_result, cloud, result)
-        hint = "" if result.elements else tr(". Check the length unit and the smallest radius")
-        seconds = sum(result.seconds.values())
-        took = tr(" Detected in {seconds:.0f} s.").format(seconds=seconds) if seconds >= 1 else ""
-        severity = "info" if result.elements else "warning"
-        # Another scan may be looked at meanwhile.
-        scan = next((s for s in self.document.scans if s.cloud is cloud), None)
-        whose = f"{scan.name}: " if scan is not None and scan is not self.document.scan else ""
-        self.panels.message.tell(f"{whose}{descriptions.summary(result)}{hint}.{took}", severity)
-
-    def choose_in_tree(self, scan_index: int, kind: NodeKind, item_id: int) -> None:
-        """Select what was chosen in the tree, in another scan if it is there."""
-        if scan_index != self.document.active:
-            self.do(commands.activate_scan, scan_index)
-        choose = {
-            NodeKind.RUN: commands.select_run,
-            NodeKind.ELEMENT: commands.select_element,
-            NodeKind.DEFORMATION: commands.select_deformation,
-        }.get(kind)
-        if choose is not None:
-            self.do(choose, item_id)
-        elif kind is NodeKind.SCAN:
-            self.do(commands.select, type(self.document.selection)())
-
-    def hover(self, point_index: int) -> None:
-        """Say what is under the cursor: coordinates below, name and deviation beside it."""
-        scan = self.document.scan
-        if scan is None or point_index < 0:
-            self.status.cursor_position.clear()
-            QToolTip.hideText()
-            return
-        self.status.cursor_position.setText(descriptions.coordinates(scan.cloud, point_index))
-        text = descriptions.hover_text(scan, point_index)
-        QToolTip.showText(QCursor.pos(), text, self.parts.scene)
-
-    def tell_crash(self, message: str, details: str) -> None:
-        """Say that something went wrong that should not have, and keep a copy of the work."""
-        self.panels.message.tell(message, "error", details)
-        if self.projects.rescue is not None:
-            self.projects.rescue.keep()
-
-    # States go to the parts
-
-    def _show(self, document: Document) -> None:
-        self._apply(resolve(document))
-        self.projects.show_title()
-
-    def _apply(self, state: ViewState, *, everything: bool = False) -> None:
-        before, self._state = self._state, state
-        for name, part in self._consumers().items():
-            if everything or getattr(state, name) != getattr(before, name):
-                part(getattr(state, name))
-        self.update_actions()
-
-    def _consumers(self) -> dict[str, Callable[[Any], None]]:
-        panels, parts = self.panels, self.parts
-        return {
-            "window": self._apply_window,
-            "tree": panels.tree.apply,
-            "stacks": panels.stacks.apply,
-            "planning": lambda state: self.previews.apply(state.cloud, state.settings),
-            "settings": panels.settings.apply,
-            "table": panels.table.apply,
-            "clip": panels.clip.apply,
-            "profile_bar": panels.profiles.apply,
-            "properties": self._apply_properties,
-            "radius_plot": parts.radius_plot.apply,
-            "section": parts.section.apply,
-            "map": parts.map.apply,
-            "scene": parts.scene.apply,
-        }
-
-    def _apply_window(self, state: WindowState) -> None:
-        has_scan = state.scan is not None
-        self.centre.setCurrentWidget(self.parts.scene if has_scan else self.panels.welcome)
+    def apply(self, state: WindowState) -> None:
+        """Show the scene or the welcome, and check marks as the view options have them."""
+        self._has_scan = state.scan is not None
+        self.centre.setCurrentWidget(self.views.scene if self._has_scan else self.panels.welcome)
         self.tool_bar.apply(state)
         self.status.apply(state)
+        check = self.actions_.set_checked
         for name in VIEW_OPTIONS:
-            self.actions_.set_checked(name, bool(getattr(state.view, name)))
+            check(name, bool(getattr(state.view, name)))
         if state.view.eye_dome is None:
-            self.actions_.set_checked("eye_dome", self.parts.scene.shades_edges)
+            check("eye_dome", self.views.scene.shades_edges)
         box = state.view.clip_box
-        self.actions_.set_checked("clip", box is not None)
-        self.actions_.set_checked("invert_clip", box is not None and box.is_inverted)
-        self.actions_.set_checked("measure", state.view.tool is Tool.MEASURE)
-        self.actions_.set_checked("coordinates", state.view.tool is Tool.COORDINATES)
+        check("clip", box is not None)
+        check("invert_clip", box is not None and box.is_inverted)
+        check("measure", state.view.tool is Tool.MEASURE)
+        check("coordinates", state.view.tool is Tool.COORDINATES)
         for background in Background:
-            chosen = background is state.view.background
-            self.actions_.set_checked(f"background_{background.name.lower()}", chosen)
+            check(f"background_{background.name.lower()}", background is state.view.background)
 
-    def _apply_properties(self, state: PropertiesState) -> None:
+    def apply_properties(self, state: PropertiesState) -> None:
+        """Show the properties of what is selected, and head the plots with its name."""
         self.panels.properties.apply(state)
         result = state.scan.result if state.scan else None
         title = descriptions.title(result, state.selection)
         self.panels.docks["Element"].setWindowTitle(title or "Element")
 
-    def update_actions(self) -> None:
-        """Enable the actions that make sense now."""
-        document, busy = self.document, self.jobs.is_busy
-        view = document.view
-        self.actions_.update(
-            {
-                "scan": document.scan is not None,
-                "scans": len(document.scans) > 1,
-                "result": document.result is not None,
-                "deformations": bool(document.result and document.result.deformations),
-                "selection": self._state.window.has_selection,
-                "escape": self._state.window.has_selection or view.tool is not Tool.SELECT,
-                "stack": view.colour_by is ColourBy.PROFILE and bool(view.shown_stack),
-                "measured": bool(view.measurements),
-                "hidden": bool(document.view.hidden_elements),
-                "busy": busy,
-                "idle": not busy,
-                **conditions(document),
-                "undo": bool(self.history.undo_text),
-                "redo": bool(self.history.redo_text),
-            }
-        )
-        undo, redo = self.history.undo_text, self.history.redo_text
+    def apply_actions(self, conditions: Mapping[str, bool], undo: str, redo: str) -> None:
+        """Enable the actions that make sense now.
+
+        Parameters
+        ----------
+        conditions : mapping
+            What actions may need, and whether it is there.
+        undo, redo : str
+            The steps that would be undone and redone, "" for none.
+        """
+        self.actions_.update({**conditions, "undo": bool(undo), "redo": bool(redo)})
         undo_text = tr("Undo {what}").format(what=inside(tr(undo))) if undo else tr("Undo")
         redo_text = tr("Redo {what}").format(what=inside(tr(redo))) if redo else tr("Redo")
         self.actions_["undo"].setText(undo_text)
         self.actions_["redo"].setText(redo_text)
 
-    # Qt
+    def show_title(self, name: str, has_unsaved_work: bool) -> None:
+        """Show in the title what is worked on, and whether it is saved."""
+        self.setWindowTitle(f"{name}[*] – PipeGUI" if name else "PipeGUI")
+        self.setWindowModified(bool(name) and has_unsaved_work)
 
-    def refresh_colours(self) -> None:
-        """Draw all in the colours that the theme has now."""
-        app = QApplication.instance()
-        if isinstance(app, QApplication):
-            theme.apply_theme(app)
+    def show_partial_cloud(self, part: PointCloud) -> None:
+        """Show what was read so far of the first scan."""
+        if not self._has_scan:
+            self.centre.setCurrentWidget(self.views.scene)
+            self.views.scene.glimpse(part)
+
+    def end_partial_cloud(self) -> None:
+        """Show no more of what was read so far: it comes as a scan, or not at all."""
+        self.views.scene.end_glimpse()
+        if not self._has_scan:
+            self.centre.setCurrentWidget(self.panels.welcome)
+
+    def show_tool_tip(self, text: str) -> None:
+        """Show a text beside the cursor in the 3D view; "" hides it."""
+        if text:
+            QToolTip.showText(QCursor.pos(), text, self.views.scene)
+        else:
+            QToolTip.hideText()
+
+    def show_status(self, text: str) -> None:
+        """Show a text in the status bar for a moment."""
+        self.status.showMessage(text, 4000)
+
+    def refresh_icons(self) -> None:
+        """Draw all icons in the colours that the theme has now."""
         theme.refresh_icons(self)
         self.panels.welcome.refresh_icons()
-        self._apply(self._state, everything=True)
+
+    # What it does on its own
+
+    def go_to_next_panel(self, by: int) -> None:
+        """Give the focus to the next (+1) or previous (-1) panel."""
+        panels = [self.centre, *self.panels.docks.values()]
+        go_to_next_panel(panels, self.focusWidget(), by)
+
+    def search_actions(self) -> None:
+        """Open the command palette."""
+        if self._palette is None:
+            self._palette = CommandPalette(self, self.actions_.entries)
+        self._palette.open()
+
+    def show_shortcuts(self) -> None:
+        """List all shortcuts."""
+        ShortcutList(self, self.actions_).show()
+
+    def show_about(self) -> None:
+        """Say which version this is."""
+        show_about(self)
+
+    # Qt
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
-        """Take files that are held over the window."""
+        """Accept files that are held over the window."""
         if any(url.isLocalFile() for url in event.mimeData().urls()):
             event.acceptProposedAction()
             self.panels.welcome.show_dragging(True)
 
-    def dragLeaveEvent(self, event: Any) -> None:  # noqa: N802
-        """Forget about them."""
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:  # noqa: N802
+        """Show no more that files would be accepted."""
         self.panels.welcome.show_dragging(False)
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
-        """Open dropped files."""
+        """Report dropped files."""
         self.panels.welcome.show_dragging(False)
         urls = [url for url in event.mimeData().urls() if url.isLocalFile()]
-        self.open_files([Path(url.toLocalFile()) for url in urls])
+        self.files_dropped.emit([Path(url.toLocalFile()) for url in urls])
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Keep the layout, stop the work, let go of VTK while its context is there."""
-        if not self.projects.may_close():
+        """Store the layout, have the work ended, release VTK while its context is there."""
+        if not self.may_close():
             event.ignore()
             return
-        self.stored.setValue("window/geometry", self.saveGeometry())
-        self.stored.setValue("window/state", self.saveState(LAYOUT_VERSION))
-        QApplication.styleHints().colorSchemeChanged.disconnect(self.refresh_colours)
-        self.jobs.close()
-        self.projects.close()
-        self.parts.scene.close()
+        store_layout(self, self._stored)
+        self.closing.emit()
+        self.views.scene.close()
         super().closeEvent(event)

@@ -1,21 +1,29 @@
 """Going from panel to panel with the keyboard."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from PySide6.QtCore import QObject, Qt
-from PySide6.QtWidgets import QApplication, QWidget
-
-if TYPE_CHECKING:
-    from pipegui.window.main_window import MainWindow
+from PySide6.QtWidgets import QApplication, QDockWidget, QWidget
 
 
-def go_to_next_panel(window: "MainWindow", by: int) -> None:
-    """Give the focus to the next (+1) or previous (-1) panel that can be seen."""
-    places: list[QWidget] = [window.centre, *window.panels.docks.values()]
-    places = [place for place in places if not place.visibleRegion().isEmpty()]
-    focused = window.focusWidget()
-    here = next((i for i, p in enumerate(places) if p is focused or p.isAncestorOf(focused)), None)
-    if focused is None or here is None:
+def go_to_next_panel(panels: Iterable[QWidget], focused: QWidget | None, by: int) -> None:
+    """Give the focus to the next (+1) or previous (-1) panel that can be seen.
+
+    Parameters
+    ----------
+    panels : iterable of QWidget
+        All panels, in their order.
+    focused : QWidget or None
+        The widget that has the focus now.
+    by : int
+        +1 or -1.
+    """
+    places = [panel for panel in panels if not panel.visibleRegion().isEmpty()]
+    here = next(
+        (i for i, p in enumerate(places) if focused and (p is focused or p.isAncestorOf(focused))),
+        None,
+    )
+    if here is None:
         here = -1 if by > 0 else 0
     for step in range(1, len(places) + 1):
         target = _first_input(places[(here + by * step) % len(places)])
@@ -33,20 +41,28 @@ def _first_input(panel: QWidget) -> QWidget | None:
     return None
 
 
-class FocusInSight(QObject):
-    """Brings a panel forward that lies behind another when Tab leads into it."""
+class RaiseFocusedDock(QObject):
+    """Raises a dock that lies behind another when Tab leads into it.
 
-    def __init__(self, window: "MainWindow") -> None:
-        super().__init__(window)
-        self._docks = window.panels.docks
+    Parameters
+    ----------
+    docks : iterable of QDockWidget
+        Those that may lie behind one another.
+    parent : QObject
+        What this ends with.
+    """
+
+    def __init__(self, docks: Iterable[QDockWidget], parent: QObject) -> None:
+        super().__init__(parent)
+        self._docks = list(docks)
         app = QApplication.instance()
         assert isinstance(app, QApplication)
-        app.focusChanged.connect(self._look)
+        app.focusChanged.connect(self._on_focus_changed)
 
-    def _look(self, _before: QWidget | None, now: QWidget | None) -> None:
+    def _on_focus_changed(self, _before: QWidget | None, now: QWidget | None) -> None:
         if now is None:
             return
-        for dock in self._docks.values():
+        for dock in self._docks:
             is_behind = dock.isVisible() and dock.visibleRegion().isEmpty()
             if is_behind and dock.isAncestorOf(now):
                 dock.raise_()

@@ -1,6 +1,4 @@
-"""The list of all keys, by menu, and of those that work inside a panel."""
-
-from typing import TYPE_CHECKING
+"""The list of all shortcuts, by menu, and of those that work inside a panel."""
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence
@@ -17,9 +15,7 @@ from PySide6.QtWidgets import (
 from pipegui.i18n.texts import mark, plain_title, tr
 from pipegui.style import theme
 from pipegui.window.action_table import MENUS
-
-if TYPE_CHECKING:
-    from pipegui.window.main_window import MainWindow
+from pipegui.window.actions import Actions
 
 IN_PANELS = {
     mark("Deformations"): (
@@ -36,21 +32,21 @@ IN_PANELS = {
         ("Ctrl+Shift+C", mark("Copy the picture")),
     ),
 }
-"""Keys that are not in the menus: they work while the panel has the focus."""
+"""Shortcuts that are not in the menus: they work while the panel has the focus."""
 N_COLUMNS = 3
 
 
 class ShortcutList(QDialog):
-    """Shows all keys; Esc closes it."""
+    """Shows all shortcuts; Esc closes it."""
 
-    def __init__(self, window: "MainWindow") -> None:
-        super().__init__(window)
+    def __init__(self, parent: QWidget, actions: Actions) -> None:
+        super().__init__(parent)
         self.setObjectName("shortcuts")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setWindowTitle(tr("Keyboard shortcuts"))
         groups = {
             plain_title(tr(menu)): [
-                (_text(window.actions_[spec.name].shortcut()), tr(spec.text).rstrip("…"))
+                (_text(actions[spec.name].shortcut()), tr(spec.text).rstrip("…"))
                 for spec in specs
                 if spec is not None and spec.shortcut
             ]
@@ -81,11 +77,11 @@ class ShortcutList(QDialog):
         whole = QVBoxLayout(self)
         whole.addWidget(area)
         whole.addWidget(buttons)
-        room = window.screen().availableGeometry().size() * 0.9
+        room = parent.screen().availableGeometry().size() * 0.9
         wanted = body.sizeHint()
         self.resize(
-            min(wanted.width() + 6 * theme.SPACING, room.width(), window.width()),
-            min(wanted.height() + 10 * theme.SPACING, room.height(), window.height()),
+            min(wanted.width() + 6 * theme.SPACING, room.width(), parent.width()),
+            min(wanted.height() + 10 * theme.SPACING, room.height(), parent.height()),
         )
 
 

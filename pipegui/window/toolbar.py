@@ -1,6 +1,7 @@
 """The tool bar: open, detect, cancel, undo, views, and what the colours mean."""
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QLabel, QToolBar, QToolButton, QWidget
 
 from pipegui.i18n.texts import tr
@@ -60,7 +61,7 @@ class ToolBar(QToolBar):
         self._limit_label = self.addWidget(QLabel(tr("Limits")))
         self._limit_action = self.addWidget(self.limit)
         self.ends = [QuietSpinBox() for _ in range(2)]
-        self._end_actions = []
+        self._end_actions: list[QAction] = []
         self._limits: Limits | None = None
         for end, name in enumerate((tr("Lower limit"), tr("Upper limit"))):
             field = self.ends[end]

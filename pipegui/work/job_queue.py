@@ -23,8 +23,8 @@ from pipegui.work.worker import (
     Event,
     Failed,
     Finished,
-    Glimpsed,
     JobProgress,
+    PartReady,
     Progressed,
     Started,
     Worker,
@@ -42,7 +42,9 @@ def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointClo
     """Read a scan with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
-    return read(path, length_unit=settings.input.length_unit, progress=progress, look=progress.look)
+    return read(
+        path, length_unit=settings.input.length_unit, progress=progress, look=progress.show_part
+    )
 
 
 def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -> Result:
@@ -68,7 +70,7 @@ Change = Callable[[JobProgress], Result]
 
 
 def plan_cuts(cloud: PointCloud, settings: Settings, progress: JobProgress) -> "Plan | None":
-    """Tell with pipecore what a detection would cut."""
+    """Plan with pipecore what a detection would cut."""
     from pipecore.preview import plan_stacks  # noqa: PLC0415 - numba takes its time
 
     return plan_stacks(cloud, settings, progress)
@@ -77,28 +79,28 @@ def plan_cuts(cloud: PointCloud, settings: Settings, progress: JobProgress) -> "
 @dataclass(frozen=True)
 class _Request:
     title: str
-    """"" for a glance."""
+    """"" for idle work."""
     work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
     failed: Callable[[str], None] | None = None
     is_reading: bool = False
 
     @property
-    def is_glance(self) -> bool:
+    def is_idle_work(self) -> bool:
         return not self.title
 
 
-class Jobs(QObject):
-    """Runs requests one after the other and tells what came of them.
+class JobQueue(QObject):
+    """Runs requests one after the other and reports what came of them.
 
-    Scans that are opened while something else runs are read beside it.
+    Scans that are opened while something else runs are read in parallel.
     """
 
     busy_changed = Signal(bool)
     started = Signal(str)
     progressed = Signal(object)
     """A `Progressed` event."""
-    glimpsed = Signal(object)
+    part_read = Signal(object)
     """A part of the cloud that is being read."""
     cancelling = Signal()
     ended = Signal()
@@ -107,8 +109,8 @@ class Jobs(QObject):
     failed = Signal(str, str)
     """Message, and details for a bug report."""
 
-    beside = Signal(str)
-    """What is read beside the running job; "" for no more."""
+    parallel_changed = Signal(str)
+    """Title of the job that runs in parallel; "" when it has ended."""
 
     scan_read = Signal(object)
     """A `Scan`."""
@@ -130,32 +132,33 @@ class Jobs(QObject):
         self.read, self._detect = read, detect
         self.plan = plan
         self._waiting: deque[_Request] = deque()
-        self._glance: _Request | None = None
-        self._beside: Jobs | None = None
+        self._idle_work: _Request | None = None
+        self._parallel: JobQueue | None = None
         self._running: _Request | None = None
         self.worker = Worker(self)
         self.worker.happened.connect(self._take)
 
     @property
     def is_busy(self) -> bool:
-        """Whether something that was asked for runs or waits; a glance does not count."""
-        return self._is_told_of or bool(self._waiting)
+        """Whether something that was asked for runs or waits; idle work does not count."""
+        return self._is_requested_work or bool(self._waiting)
 
     @property
-    def _is_told_of(self) -> bool:
+    def _is_requested_work(self) -> bool:
         """Whether what runs was asked for."""
-        return self._running is not None and not self._running.is_glance
+        return self._running is not None and not self._running.is_idle_work
 
     @property
     def title(self) -> str:
         """What is being done that was asked for; "" while nothing is."""
-        if self._running is not None and self._is_told_of:
+        if self._running is not None and self._is_requested_work:
             return self._running.title
         return self._waiting[0].title if self._waiting else ""
 
     def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
         """Read each file as a scan of its own, without waiting for a detection."""
-        lane = self if self._running is None or self._running.is_reading else self._side_lane()
+        can_wait = self._running is None or self._running.is_reading
+        queue = self if can_wait else self._parallel_queue()
         for path in paths:
 
             def work(progress: JobProgress, path: Path = path) -> Scan:
@@ -167,18 +170,18 @@ class Jobs(QObject):
                 return Scan(path.name, cloud, length_unit=unit, fingerprint=fingerprint)
 
             title = tr("Reading {name}").format(name=path.name)
-            lane._request(_Request(title, work, self.scan_read.emit, is_reading=True))
+            queue._request(_Request(title, work, self.scan_read.emit, is_reading=True))
 
-    def _side_lane(self) -> "Jobs":
-        if self._running is not None and self._running.is_glance:
+    def _parallel_queue(self) -> "JobQueue":
+        if self._running is not None and self._running.is_idle_work:
             return self  # it makes way
-        if self._beside is None:
-            self._beside = Jobs(parent=self)
-            self._beside.started.connect(self.beside)
-            self._beside.ended.connect(lambda: self.beside.emit(""))
-            self._beside.cancelled.connect(self.cancelled)
-            self._beside.failed.connect(self.failed)
-        return self._beside
+        if self._parallel is None:
+            self._parallel = JobQueue(parent=self)
+            self._parallel.started.connect(self.parallel_changed)
+            self._parallel.ended.connect(lambda: self.parallel_changed.emit(""))
+            self._parallel.cancelled.connect(self.cancelled)
+            self._parallel.failed.connect(self.failed)
+        return self._parallel
 
     def detect(self, cloud: PointCloud, settings: Settings) -> None:
         """Detect on a cloud."""
@@ -208,37 +211,37 @@ class Jobs(QObject):
         """Write something that takes its time."""
         self._request(_Request(tr("Exporting"), write, lambda _: self.written.emit(path)))
 
-    def glance(
+    def run_when_idle(
         self,
         work: Callable[[JobProgress], Any],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
     ) -> None:
-        """Do something small once nothing else runs; nobody is told of it but the caller.
+        """Do something small once nothing else runs; only the caller hears of it.
 
-        A newer glance takes its place, and work that is asked for goes before it.
+        Newer idle work takes its place, and work that was asked for goes before it.
         """
-        self._glance = _Request("", work, done, failed)
+        self._idle_work = _Request("", work, done, failed)
         if self._running is None:
             self._next()
-        elif self._running.is_glance:
+        elif self._running.is_idle_work:
             self.worker.cancel()
 
     def cancel(self) -> None:
         """Stop what runs, and forget what waits."""
         self._waiting.clear()
-        if self._beside is not None:
-            self._beside.cancel()
+        if self._parallel is not None:
+            self._parallel.cancel()
         if self._running is not None:
-            if self._is_told_of:
+            if self._is_requested_work:
                 self.cancelling.emit()
             self.worker.cancel()
 
     def close(self) -> None:
         """Stop everything and wait for the worker's thread."""
         self._waiting.clear()
-        if self._beside is not None:
-            self._beside.close()
+        if self._parallel is not None:
+            self._parallel.close()
         self.worker.happened.disconnect(self._take)
         self.worker.close()
 
@@ -246,36 +249,36 @@ class Jobs(QObject):
         self._waiting.append(request)
         if self._running is None:
             self._next()
-        elif self._running.is_glance:
+        elif self._running.is_idle_work:
             self.worker.cancel()
             self.busy_changed.emit(self.is_busy)
 
     def _next(self) -> None:
         if self._waiting:
             self._running = self._waiting.popleft()
-        elif self._glance is not None:
-            self._running, self._glance = self._glance, None
+        elif self._idle_work is not None:
+            self._running, self._idle_work = self._idle_work, None
         if self._running is not None:
             self.worker.start(self._running.title, self._running.work)
         self.busy_changed.emit(self.is_busy)
 
     def _take(self, event: Event) -> None:
         match event:
-            case Started() if self._is_told_of:
+            case Started() if self._is_requested_work:
                 self.started.emit(event.title)
-            case Progressed() if self._is_told_of:
+            case Progressed() if self._is_requested_work:
                 self.progressed.emit(event)
-            case Glimpsed():
-                self.glimpsed.emit(event.part)
+            case PartReady():
+                self.part_read.emit(event.part)
             case Finished() | Failed() | Cancelled():
                 self._end(event)
 
     def _end(self, event: Finished | Failed | Cancelled) -> None:
         request, self._running = self._running, None
-        if request is not None and request.is_glance:
-            if isinstance(event, Cancelled) and self._waiting and self._glance is None:
-                self._glance = request  # it made way for work that was asked for
-            _tell_of_glance(request, event)
+        if request is not None and request.is_idle_work:
+            if isinstance(event, Cancelled) and self._waiting and self._idle_work is None:
+                self._idle_work = request  # it made way for work that was asked for
+            _end_idle_work(request, event)
         elif request is not None:
             self.ended.emit()
             match event:
@@ -290,7 +293,7 @@ class Jobs(QObject):
             self._next()
 
 
-def _tell_of_glance(request: _Request, event: Finished | Failed | Cancelled) -> None:
+def _end_idle_work(request: _Request, event: Finished | Failed | Cancelled) -> None:
     if isinstance(event, Finished):
         request.done(event.value)
     elif isinstance(event, Failed) and request.failed is not None:

@@ -33,7 +33,7 @@ def detect_demo(folder: str) -> list[str]:
     return [sys.executable, "-m", "pipecore", "detect", demo, "-o", f"{folder}/report", "--quiet"]
 
 
-class Warming(QObject):
+class KernelWarmup(QObject):
     """Runs the command once for each stamp."""
 
     started = Signal()
@@ -48,7 +48,7 @@ class Warming(QObject):
         self._command = list(command or detect_demo(self._folder.name))
         self._process = QProcess(self)
         self._process.finished.connect(self._finish)
-        self._process.started.connect(self._step_back)
+        self._process.started.connect(self._lower_priority)
 
     def start(self) -> None:
         """Compile unless that was done before; not in a bundle, which has no interpreter."""
@@ -70,7 +70,7 @@ class Warming(QObject):
             self._stored.setValue(KEY, stamp())
         self.ended.emit()
 
-    def _step_back(self) -> None:
+    def _lower_priority(self) -> None:
         """Let everything else go first."""
         if hasattr(os, "setpriority"):
             with suppress(OSError):  # it has ended already

@@ -13,8 +13,8 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from pipecore.settings import Settings
 from pipecore.types import PointCloud
 from pipegui.i18n.texts import tr
-from pipegui.states.preview_state import PlanState, PreviewState
-from pipegui.work.job_queue import Jobs
+from pipegui.states.preview_state import PlanningState, PlanState, PreviewState
+from pipegui.work.job_queue import JobQueue
 
 if TYPE_CHECKING:
     from pipecore.preview import Plan, ProfilePreview
@@ -49,7 +49,7 @@ class Previews(QObject):
     previewed = Signal(object)
     """A `PreviewState`."""
 
-    def __init__(self, jobs: Jobs, parent: QObject | None = None) -> None:
+    def __init__(self, jobs: JobQueue, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._jobs = jobs
         self._wish: _Wish | None = None
@@ -72,9 +72,10 @@ class Previews(QObject):
         self._is_profile_seen = is_seen
         self._soon.start()
 
-    def apply(self, cloud: PointCloud | None, settings: Settings) -> None:
-        """Look at a scan with these settings."""
-        before, self._wish = self._wish, _Wish(cloud, settings) if cloud is not None else None
+    def apply(self, state: PlanningState) -> None:
+        """Look at the active scan with the present settings."""
+        cloud, settings, before = state.cloud, state.settings, self._wish
+        self._wish = _Wish(cloud, settings) if cloud is not None else None
         if self._wish is None:
             self._forget("")
         elif not self._wish.has_same_plan(before):
@@ -131,7 +132,7 @@ class Previews(QObject):
         self._look(work, done)
 
     def _look(self, work: Callable[..., object], done: Callable[..., None]) -> None:
-        self._jobs.glance(work, done, self._fail)
+        self._jobs.run_when_idle(work, done, self._fail)
 
     def _fail(self, message: str) -> None:
         self._planned_for = self._wish  # asked again only once something changes

@@ -1,4 +1,4 @@
-"""Long work beside the window: one job at a time, told as typed events.
+"""Long work in a thread of its own: one job at a time, reported as typed events.
 
 Each job ends in exactly one of `Finished`, `Failed` and `Cancelled`. Starting a job
 cancels the one that runs. A cancelled job ends at its next sign of progress, and for the
@@ -41,7 +41,7 @@ class Progressed:
 
 
 @dataclass(frozen=True, eq=False)
-class Glimpsed:
+class PartReady:
     """A part of what a job makes can be shown already."""
 
     job: int
@@ -72,7 +72,7 @@ class Cancelled:
     job: int
 
 
-Event = Started | Progressed | Glimpsed | Finished | Failed | Cancelled
+Event = Started | Progressed | PartReady | Finished | Failed | Cancelled
 
 EVENTS_PER_SECOND = 15
 PATIENCE_MS = 450
@@ -111,10 +111,10 @@ class JobProgress:
         left = elapsed * (1 - done) / done if elapsed > 1.0 and done > 0.05 else None
         self._emit(Progressed(self._job, stage, done, left))
 
-    def look(self, part: Any) -> None:
+    def show_part(self, part: Any) -> None:
         """Show a part of what the job makes."""
         if not self.is_cancelled.is_set():
-            self._emit(Glimpsed(self._job, part))
+            self._emit(PartReady(self._job, part))
 
     def _of_all(self, stage: str, fraction: float) -> float:
         """How much of the whole work is done; of the stage where no more is known."""

@@ -12,13 +12,14 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from pipegui.composition import Application, compose
 from pipegui.i18n import texts
 from pipegui.model.document import Document, Scan
 from pipegui.style import theme
 from pipegui.window.main_window import MainWindow
-from pipegui.work.job_queue import Jobs
+from pipegui.work.job_queue import JobQueue
 from tests.factories import make_cloud, make_result
-from tests.gui.fakes import make_fake_parts
+from tests.gui.fakes import make_fake_views
 from tests.gui.patience import PATIENCE, PatientBot
 
 
@@ -88,7 +89,7 @@ def _clear_away(app: QApplication, windows: Collection[int]) -> None:
         is_new = shiboken6.getCppPointer(widget)[0] not in windows
         if is_new and widget.isVisible():
             if isinstance(widget, MainWindow):
-                widget.projects.discard()
+                widget.may_close = lambda: True
             widget.close()
     _flush()
 
@@ -113,7 +114,7 @@ def no_leaks(request: pytest.FixtureRequest) -> Iterator[None]:
     _flush()
     for thread in set(threading.enumerate()) - threads:
         thread.join(ENDING_S)
-    left = [window for address, window in _top_level(app).items() if address not in windows]
+    left = [name for address, name in _top_level(app).items() if address not in windows]
     running = [t for t in threading.enumerate() if t not in threads and t.is_alive()]
     rendering = _render_windows() - render_windows
     if left:
@@ -149,49 +150,49 @@ def document() -> Document:
 
 
 @pytest.fixture
-def make_window(
-    qtbot: QtBot, tmp_path: Path, no_leaks: None
-) -> Iterator[Callable[..., MainWindow]]:
+def make_app(qtbot: QtBot, tmp_path: Path, no_leaks: None) -> Iterator[Callable[..., Application]]:
     """Make windows over fakes; `read` and `detect` replace pipecore's."""
     cloud, result = make_cloud(), make_result()
-    windows: list[MainWindow] = []
+    apps: list[Application] = []
 
     def make(
         read=lambda *_: cloud,
         detect=lambda *_: result,
-        parts=None,
+        views=None,
         plan=lambda *_: None,
-        rescue=None,
-    ) -> MainWindow:
+        copies=None,
+    ) -> Application:
         stored = QSettings(str(tmp_path / "window.ini"), QSettings.Format.IniFormat)
-        window = MainWindow(parts or make_fake_parts(), Jobs(read, detect, plan), stored, rescue)
-        windows.append(window)
-        window.resize(1366, 768)
-        with qtbot.waitActive(window):  # without it keys do not reach the shortcuts
-            window.show()
-            window.activateWindow()
-        return window
+        app = compose(views or make_fake_views(), JobQueue(read, detect, plan), stored, copies)
+        apps.append(app)
+        app.window.resize(1366, 768)
+        with qtbot.waitActive(app.window):  # without it keys do not reach the shortcuts
+            app.window.show()
+            app.window.activateWindow()
+        return app
 
     yield make
-    for window in windows:
-        window.projects.discard()
-        window.close()
-        window.deleteLater()
-    windows.clear()
+    for app in apps:
+        app.controllers.project.discard_changes()
+        app.window.close()
+        app.window.deleteLater()
+    apps.clear()
     _flush()
 
 
 @pytest.fixture
-def window(make_window: Callable[..., MainWindow]) -> MainWindow:
+def app(make_app: Callable[..., Application]) -> Application:
     """A window with nothing open."""
-    return make_window()
+    return make_app()
 
 
 @pytest.fixture
-def detected(qtbot: QtBot, window: MainWindow) -> MainWindow:
+def detected(qtbot: QtBot, app: Application) -> Application:
     """A window with a scan open and detected."""
-    window.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: window.document.scan is not None)
-    window.detect()
-    qtbot.waitUntil(lambda: window.document.result is not None and not window.jobs.is_busy)
-    return window
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: app.session.document.scan is not None)
+    app.controllers.scans.detect()
+    qtbot.waitUntil(
+        lambda: app.session.document.result is not None and not app.session.jobs.is_busy
+    )
+    return app

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QWidget
 
-from pipegui.window.views import Parts
+from pipegui.window.views import Views
 
 
 class FakeView(QWidget):
@@ -119,5 +119,5 @@ class FakeMap(FakeView):
         self.cursor = place
 
 
-def make_fake_parts() -> Parts:
-    return Parts(FakeScene(), FakeRadiusPlot(), FakeSection(), FakeMap(), FakePreview())
+def make_fake_views() -> Views:
+    return Views(FakeScene(), FakeRadiusPlot(), FakeSection(), FakeMap(), FakePreview())

@@ -39,13 +39,13 @@ def is_inside_another(widget):
     return isinstance(widget, own) or widget.objectName().startswith("qt_")
 
 
-def inputs(window):
-    return [w for w in window.findChildren(QWidget) if isinstance(w, INPUTS)]
+def inputs(app):
+    return [w for w in app.window.findChildren(QWidget) if isinstance(w, INPUTS)]
 
 
 def has_label(widget):
-    window = widget.window()
-    return any(label.buddy() is widget for label in window.findChildren(QLabel))
+    labels = widget.window().findChildren(QLabel)
+    return any(label.buddy() is widget for label in labels)
 
 
 def named(widget):
@@ -53,22 +53,22 @@ def named(widget):
 
 
 @pytest.fixture
-def whole(make_window, qtbot):
+def whole(make_app, qtbot):
     """A window with the real plots beside a fake 3D view."""
     from pipegui.plots.deviation_map import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView
-    from tests.gui.fakes import make_fake_parts
+    from tests.gui.fakes import make_fake_views
 
-    parts = make_fake_parts()
-    parts.radius_plot, parts.section = RadiusPlot(), SectionView()
-    parts.map, parts.preview = DeviationMapView(), PreviewView()
-    window = make_window(parts=parts)
-    window.do(commands.open_scan, Scan("plant.laz", CLOUD))
-    window.take_result(CLOUD, RESULT)
-    window.do(view_commands.clip_to_scan)
-    return window
+    views = make_fake_views()
+    views.radius_plot, views.section = RadiusPlot(), SectionView()
+    views.map, views.preview = DeviationMapView(), PreviewView()
+    app = make_app(views=views)
+    app.session.do(commands.open_scan, Scan("plant.laz", CLOUD))
+    app.controllers.scans.on_detected(CLOUD, RESULT)
+    app.session.do(view_commands.clip_to_scan)
+    return app
 
 
 def test_that_every_input_has_a_name(whole):
@@ -83,7 +83,7 @@ def test_that_every_input_has_a_name(whole):
 def test_that_every_button_without_words_has_a_name_and_a_tip(whole):
     silent = [
         named(button)
-        for button in whole.findChildren(QAbstractButton)
+        for button in whole.window.findChildren(QAbstractButton)
         if not is_inside_another(button)
         and not button.text()
         and not (button.accessibleName() and button.toolTip())
@@ -105,13 +105,13 @@ def test_that_every_choice_and_number_explains_itself(whole):
 
 
 def test_that_tab_goes_down_the_settings(whole, qtbot):
-    form = whole.panels.settings
-    whole.panels.docks["Settings"].raise_()
+    form = whole.window.panels.settings
+    whole.window.panels.docks["Settings"].raise_()
     form.presets.choice.setFocus()
     places = []
     for _ in range(40):
-        qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_Tab)
-        focused = whole.focusWidget()
+        qtbot.keyClick(whole.window.focusWidget(), Qt.Key.Key_Tab)
+        focused = whole.window.focusWidget()
         if not form.isAncestorOf(focused) or focused in (form.reset, form.advanced.button):
             break
         places.append(focused.mapTo(form.widget(), focused.rect().topLeft()).y())
@@ -120,18 +120,18 @@ def test_that_tab_goes_down_the_settings(whole, qtbot):
 
 
 def test_that_f6_goes_from_panel_to_panel_and_back(whole, qtbot):
-    docks = whole.panels.docks
+    docks = whole.window.panels.docks
 
     def panel_of(widget):
         return next((t for t, dock in docks.items() if dock.isAncestorOf(widget)), "centre")
 
     visited = []
     for _ in range(6):
-        qtbot.keyClick(whole.focusWidget() or whole, Qt.Key.Key_F6)
-        visited.append(panel_of(whole.focusWidget()))
+        qtbot.keyClick(whole.window.focusWidget() or whole.window, Qt.Key.Key_F6)
+        visited.append(panel_of(whole.window.focusWidget()))
     assert len(set(visited)) >= 4
-    qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
-    assert panel_of(whole.focusWidget()) == visited[-2]
+    qtbot.keyClick(whole.window.focusWidget(), Qt.Key.Key_F6, Qt.KeyboardModifier.ShiftModifier)
+    assert panel_of(whole.window.focusWidget()) == visited[-2]
 
 
 def test_that_the_list_of_keys_names_all_of_them(whole, qtbot):
@@ -139,23 +139,23 @@ def test_that_the_list_of_keys_names_all_of_them(whole, qtbot):
 
     from pipegui.window.action_table import SPECS
 
-    qtbot.keyClick(whole, Qt.Key.Key_F1)
-    dialog = whole.findChild(QDialog, "shortcuts")
+    qtbot.keyClick(whole.window, Qt.Key.Key_F1)
+    dialog = whole.window.findChild(QDialog, "shortcuts")
     text = " ".join(label.text() for label in dialog.findChildren(QLabel))
     for spec in SPECS:
         if spec.shortcut:
-            key = whole.actions_[spec.name].shortcut()
+            key = whole.window.actions_[spec.name].shortcut()
             assert key.toString(key.SequenceFormat.NativeText) in text
     for words in ("Ctrl+C", "Page Up", "F2"):
         assert words in text
     assert dialog.height() <= 768
     close = dialog.findChild(QDialogButtonBox).buttons()[0]
     qtbot.keyClick(close, Qt.Key.Key_Space)
-    qtbot.waitUntil(lambda: whole.findChild(QDialog, "shortcuts") is None)
+    qtbot.waitUntil(lambda: whole.window.findChild(QDialog, "shortcuts") is None)
 
 
 def test_that_f2_in_the_table_writes_a_comment_and_renames_nothing(whole, qtbot):
-    table = whole.panels.table
+    table = whole.window.panels.table
     table.view.setFocus()
     table.view.setCurrentIndex(table.proxy.index(0, INDEX["comment"]))
     qtbot.keyClick(table.view, Qt.Key.Key_F2)
@@ -164,31 +164,33 @@ def test_that_f2_in_the_table_writes_a_comment_and_renames_nothing(whole, qtbot)
     qtbot.keyClicks(editor, "f is no shortcut here")
     with qtbot.waitSignal(table.commented):
         qtbot.keyClick(editor, Qt.Key.Key_Return)
-    chosen = whole.document.selection.deformation_id
-    assert whole.document.scan.review(chosen).comment == "f is no shortcut here"
-    whole.actions_["undo"].trigger()
-    assert whole.document.scan.review(chosen).comment == ""
+    chosen = whole.session.document.selection.deformation_id
+    assert whole.session.document.scan.review(chosen).comment == "f is no shortcut here"
+    whole.window.actions_["undo"].trigger()
+    assert whole.session.document.scan.review(chosen).comment == ""
 
 
 def test_that_after_a_click_on_its_tab_the_arrows_step_through_the_sections(whole, qtbot):
-    tabs, section = whole.panels.plots, whole.parts.section
+    tabs, section = whole.window.panels.plots, whole.window.views.section
     place = tabs.tabBar().tabRect(tabs.indexOf(section)).center()
     qtbot.mouseClick(tabs.tabBar(), Qt.MouseButton.LeftButton, pos=place)
     qtbot.waitUntil(section.isVisible)
     shown = section.title.text()
-    qtbot.keyClick(whole.focusWidget(), Qt.Key.Key_Right)
+    qtbot.keyClick(whole.window.focusWidget(), Qt.Key.Key_Right)
     assert tabs.currentWidget() is section
     assert section.title.text() != shown
-    assert whole.document.selection.profile is not None
+    assert whole.session.document.selection.profile is not None
 
 
 def test_that_tab_never_leads_where_nothing_is_seen(detected, qtbot):
-    detected.panels.tree.view.setFocus()
+    detected.window.panels.tree.view.setFocus()
     passed = set()
     for _ in range(60):
         qtbot.waitUntil(lambda: QApplication.focusWidget() is not None)
         focused = QApplication.focusWidget()
         qtbot.waitUntil(lambda w=focused: not w.visibleRegion().isEmpty() or w.height() == 0)
-        passed |= {name for name, d in detected.panels.docks.items() if d.isAncestorOf(focused)}
+        passed |= {
+            name for name, d in detected.window.panels.docks.items() if d.isAncestorOf(focused)
+        }
         qtbot.keyClick(focused, Qt.Key.Key_Tab)
-    assert passed == set(detected.panels.docks)
+    assert passed == set(detected.window.panels.docks)

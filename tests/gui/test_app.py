@@ -10,14 +10,14 @@ from PySide6.QtGui import QImage
 from pipegui import app
 from pipegui.work import job_queue as jobs
 from tests.factories import make_cloud, make_result
-from tests.gui.fakes import make_fake_parts
+from tests.gui.fakes import make_fake_views
 
 
 @pytest.fixture
 def faked(qapp, monkeypatch):
     """The app over fakes, as `main` finds them."""
-    monkeypatch.setattr("pipegui.window.views.make_parts", make_fake_parts)
-    monkeypatch.setattr(jobs.Jobs.__init__, "__defaults__", (_read, _detect, _plan, None))
+    monkeypatch.setattr("pipegui.window.views.make_views", make_fake_views)
+    monkeypatch.setattr(jobs.JobQueue.__init__, "__defaults__", (_read, _detect, _plan, None))
 
 
 def _read(path, settings, progress):

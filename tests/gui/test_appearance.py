@@ -21,16 +21,16 @@ def contrast(one, other):
     return (light + 0.05) / (dark + 0.05)
 
 
-def test_that_the_chosen_appearance_is_shown_and_kept(make_window):
-    window = make_window()
-    window.actions_["appearance_dark"].trigger()
+def test_that_the_chosen_appearance_is_shown_and_kept(make_app):
+    app = make_app()
+    app.window.actions_["appearance_dark"].trigger()
     assert luminance(QApplication.palette().color(QPalette.ColorRole.Window)) < 0.1
-    assert window.actions_["appearance_dark"].isChecked()
-    assert not window.actions_["appearance_system"].isChecked()
-    other = make_window()
-    assert other.actions_["appearance_dark"].isChecked()
+    assert app.window.actions_["appearance_dark"].isChecked()
+    assert not app.window.actions_["appearance_system"].isChecked()
+    other = make_app()
+    assert other.window.actions_["appearance_dark"].isChecked()
     assert theme.is_dark()
-    other.actions_["appearance_light"].trigger()
+    other.window.actions_["appearance_light"].trigger()
     assert luminance(QApplication.palette().color(QPalette.ColorRole.Window)) > 0.8
 
 
@@ -41,14 +41,14 @@ def drawn(button):
     return [colour for colour in pixels if colour.alpha() > 200]
 
 
-def test_that_icons_follow_the_colours_everywhere(make_window):
-    window = make_window()
-    buttons = [b for b in window.findChildren(QAbstractButton) if b.property("iconName")]
+def test_that_icons_follow_the_colours_everywhere(make_app):
+    app = make_app()
+    buttons = [b for b in app.window.findChildren(QAbstractButton) if b.property("iconName")]
     assert len(buttons) > 8
     for name in ("appearance_dark", "appearance_light", "appearance_dark"):
-        window.actions_[name].trigger()
+        app.window.actions_[name].trigger()
         ground = QApplication.palette().color(QPalette.ColorRole.Window)
-        for button in [*buttons, window.actions_["undo"], window.actions_["open"]]:
+        for button in [*buttons, app.window.actions_["undo"], app.window.actions_["open"]]:
             button.setEnabled(True)
             assert max(contrast(c, ground) for c in drawn(button)) > 3, button.toolTip()
 

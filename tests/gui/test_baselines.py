@@ -14,7 +14,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QImage
 
 from pipegui.scene.canvas import SETTLED_SECONDS
-from pipegui.window.views import make_parts
+from pipegui.window.views import make_views
 from tests.factories import make_cloud, make_result
 from tests.gui.patience import wait_until_still
 
@@ -27,27 +27,25 @@ MANY = 60_000
 
 
 @pytest.fixture
-def window(colours_of_the_system, make_window, qtbot):
+def app(colours_of_the_system, make_app, qtbot):
     cloud, result = make_cloud(MANY), make_result(MANY)
-    window = make_window(
-        read=lambda *_: cloud, detect=lambda *_: replace(result), parts=make_parts()
-    )
-    window.actions_["fly"].setChecked(False)
-    window.open_files([Path("plant.laz")])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled)
-    window.detect()
-    qtbot.waitUntil(lambda: window.document.result is not None)
-    window.panels.message.hide()
-    return window
+    app = make_app(read=lambda *_: cloud, detect=lambda *_: replace(result), views=make_views())
+    app.window.actions_["fly"].setChecked(False)
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(app.window.actions_["detect"].isEnabled)
+    app.controllers.scans.detect()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    app.window.panels.message.hide()
+    return app
 
 
-def look(window, name, qtbot):
+def look(app, name, qtbot):
     """The view's picture, once it is drawn."""
-    view = getattr(window.parts, name)
+    view = getattr(app.window.views, name)
     if name != "scene":
-        window.panels.show_plot(view)
+        app.window.panels.show_plot(view)
     take = view.screenshot if name == "scene" else lambda: view.grab().toImage()
-    canvas = window.parts.scene.canvas
+    canvas = app.window.views.scene.canvas
     return wait_until_still(qtbot, take, lambda: canvas.seconds_to_draw == SETTLED_SECONDS)
 
 
@@ -65,9 +63,9 @@ def share_that_differs(one, other):
 
 
 @pytest.mark.parametrize("appearance", ["light", "dark"])
-def test_that_the_main_views_look_as_they_did(window, qtbot, appearance):
-    window.actions_[f"appearance_{appearance}"].trigger()
-    seen = {name: look(window, name, qtbot) for name in VIEWS}
+def test_that_the_main_views_look_as_they_did(app, qtbot, appearance):
+    app.window.actions_[f"appearance_{appearance}"].trigger()
+    seen = {name: look(app, name, qtbot) for name in VIEWS}
     if os.environ.get("PIPEGUI_NEW_BASELINES"):
         BASELINES.mkdir(parents=True, exist_ok=True)
         for name, image in seen.items():
@@ -79,10 +77,10 @@ def test_that_the_main_views_look_as_they_did(window, qtbot, appearance):
 
 
 @pytest.mark.parametrize("name", VIEWS)
-def test_that_another_selection_looks_different(window, qtbot, name):
+def test_that_another_selection_looks_different(app, qtbot, name):
     """What the comparison lets through is less than what a user would see change."""
-    window.actions_["appearance_light"].trigger()
-    before = look(window, name, qtbot)
-    window.actions_["next_deformation"].trigger()
-    window.actions_["next_deformation"].trigger()
-    assert share_that_differs(look(window, name, qtbot), before) > MAX_SHARE
+    app.window.actions_["appearance_light"].trigger()
+    before = look(app, name, qtbot)
+    app.window.actions_["next_deformation"].trigger()
+    app.window.actions_["next_deformation"].trigger()
+    assert share_that_differs(look(app, name, qtbot), before) > MAX_SHARE

@@ -5,9 +5,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QMenu
 from pytestqt.qtbot import QtBot
 
+from pipegui.composition import Application
 from pipegui.model import commands
-from pipegui.window.command_palette import CommandSearch, match
-from pipegui.window.main_window import MainWindow
+from pipegui.window.command_palette import CommandPalette, match
 
 
 @pytest.mark.parametrize(
@@ -35,34 +35,34 @@ def test_that_the_beginnings_of_words_rank_before_letters_inside_them():
 
 
 @pytest.fixture
-def search(qtbot: QtBot, detected: MainWindow) -> CommandSearch:
+def search(qtbot: QtBot, detected: Application) -> CommandPalette:
     """The search as the key opens it."""
     qtbot.keyClick(
-        detected,
+        detected.window,
         Qt.Key.Key_P,
         Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier,
     )
-    found = detected.findChild(CommandSearch)
+    found = detected.window.findChild(CommandPalette)
     qtbot.waitUntil(found.isVisible)
     return found
 
 
-def names(search: CommandSearch) -> list[str]:
+def names(search: CommandPalette) -> list[str]:
     return [search.list.topLevelItem(i).text(0) for i in range(search.list.topLevelItemCount())]
 
 
 def test_that_all_actions_are_listed_and_letters_narrow_them_down(qtbot, detected, search):
-    assert len(names(search)) == len(detected.actions_.entries())
+    assert len(names(search)) == len(detected.window.actions_.entries())
     qtbot.keyClicks(search.field, "ellip")
     assert names(search)[0] == "Ellipses"
     assert len(names(search)) < 5
 
 
 def test_that_return_carries_out_the_action_and_closes(qtbot, detected, search):
-    was_shown = detected.document.view.show_ellipses
+    was_shown = detected.session.document.view.show_ellipses
     qtbot.keyClicks(search.field, "ellip")
     qtbot.keyClick(search.field, Qt.Key.Key_Return)
-    assert detected.document.view.show_ellipses is not was_shown
+    assert detected.session.document.view.show_ellipses is not was_shown
     assert not search.isVisible()
 
 
@@ -90,19 +90,19 @@ def test_that_nothing_found_is_said(qtbot, search):
 
 
 def test_that_the_history_menu_goes_back_and_forward_to_any_step(qtbot, detected):
-    detected.do(commands.set_hidden, [1], True)
-    detected.do(commands.set_hidden, [2], True)
-    n_steps = len(detected.history.steps)
-    detected.actions_.menus["Edit"].aboutToShow.emit()
-    menu = next(m for m in detected.findChildren(QMenu) if m.title() == "History")
+    detected.session.do(commands.set_hidden, [1], True)
+    detected.session.do(commands.set_hidden, [2], True)
+    n_steps = len(detected.session.history.steps)
+    detected.window.actions_.menus["Edit"].aboutToShow.emit()
+    menu = next(m for m in detected.window.findChildren(QMenu) if m.title() == "History")
     actions = menu.actions()
-    assert [a.text() for a in actions] == ["Start", *detected.history.steps]
+    assert [a.text() for a in actions] == ["Start", *detected.session.history.steps]
     assert [a.isChecked() for a in actions] == [False] * n_steps + [True]
     actions[n_steps - 2].trigger()
-    assert detected.document.view.hidden_elements == frozenset()
-    detected.menu_actions.list_history()
+    assert detected.session.document.view.hidden_elements == frozenset()
+    detected.window.actions_.menus["Edit"].aboutToShow.emit()
     menu.actions()[-1].trigger()
-    assert detected.document.view.hidden_elements == frozenset({1, 2})
-    detected.menu_actions.list_history()
+    assert detected.session.document.view.hidden_elements == frozenset({1, 2})
+    detected.window.actions_.menus["Edit"].aboutToShow.emit()
     menu.actions()[0].trigger()
-    assert detected.document.scan is None
+    assert detected.session.document.scan is None

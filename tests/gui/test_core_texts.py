@@ -57,10 +57,10 @@ def test_that_errors_keep_what_they_say_on_their_way_between_processes():
 
 
 @pytest.mark.usefixtures("german")
-def test_that_a_failed_reading_is_told_in_german(make_window, qtbot, tmp_path):
-    window = make_window(read=lambda path, *_: read(path))
-    window.open_files([tmp_path / "none.laz"])
-    qtbot.waitUntil(lambda: "Es gibt keine Datei" in window.panels.message.text.text())
+def test_that_a_failed_reading_is_told_in_german(make_app, qtbot, tmp_path):
+    app = make_app(read=lambda path, *_: read(path))
+    app.controllers.scans.open_files([tmp_path / "none.laz"])
+    qtbot.waitUntil(lambda: "Es gibt keine Datei" in app.window.panels.message.text.text())
 
 
 @pytest.mark.usefixtures("german")

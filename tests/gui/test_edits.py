@@ -20,104 +20,106 @@ MANY = 60_000
 
 
 @pytest.fixture
-def window(make_window, qtbot):
+def app(make_app, qtbot):
     """A window with a scan that is dense enough to be measured anew."""
     cloud, result = make_scan(MANY)
-    window = make_window(read=lambda *_: cloud, detect=lambda *_: result)
-    window.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: window.document.scan is not None)
-    window.detect()
-    qtbot.waitUntil(lambda: window.document.result is not None and not window.jobs.is_busy)
-    return window
+    app = make_app(read=lambda *_: cloud, detect=lambda *_: result)
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: app.session.document.scan is not None)
+    app.controllers.scans.detect()
+    qtbot.waitUntil(
+        lambda: app.session.document.result is not None and not app.session.jobs.is_busy
+    )
+    return app
 
 
-def place_of(window, element_id: int) -> QPoint:
-    tree = window.panels.tree
+def place_of(app, element_id: int) -> QPoint:
+    tree = app.window.panels.tree
     index = tree.model.index_of(0, Selection(element_id=element_id))
     tree.view.scrollTo(index)
     return tree.view.visualRect(index).center()
 
 
-def click(window, qtbot, element_id: int, modifier=Qt.KeyboardModifier.NoModifier) -> None:
-    view = window.panels.tree.view
-    qtbot.mouseClick(view.viewport(), LEFT, modifier, place_of(window, element_id))
+def click(app, qtbot, element_id: int, modifier=Qt.KeyboardModifier.NoModifier) -> None:
+    view = app.window.panels.tree.view
+    qtbot.mouseClick(view.viewport(), LEFT, modifier, place_of(app, element_id))
 
 
-def ids(window) -> list[int]:
-    return [e.element_id for e in window.document.result.elements]
+def ids(app) -> list[int]:
+    return [e.element_id for e in app.session.document.result.elements]
 
 
-def asked(window) -> QInputDialog:
-    return window.findChild(QInputDialog, "ask")
+def asked(app) -> QInputDialog:
+    return app.window.findChild(QInputDialog, "ask")
 
 
-def test_that_delete_takes_the_selected_pipe_away_and_undo_brings_it_back(window, qtbot):
-    before = ids(window)
-    click(window, qtbot, 7)
-    assert window.document.selection.element_id == 7
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
-    assert ids(window) == [i for i in before if i != 7]
-    assert window.history.undo_text == "Delete Pipe 7"
-    assert window.actions_["undo"].text() == "Undo delete Pipe 7"
-    assert not any(d.element_id == 7 for d in window.document.result.deformations)
-    qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
-    assert ids(window) == before
+def test_that_delete_takes_the_selected_pipe_away_and_undo_brings_it_back(app, qtbot):
+    before = ids(app)
+    click(app, qtbot, 7)
+    assert app.session.document.selection.element_id == 7
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_Delete)
+    assert ids(app) == [i for i in before if i != 7]
+    assert app.session.history.undo_text == "Delete Pipe 7"
+    assert app.window.actions_["undo"].text() == "Undo delete Pipe 7"
+    assert not any(d.element_id == 7 for d in app.session.document.result.deformations)
+    qtbot.keyClick(app.window, Qt.Key.Key_Z, CONTROL)
+    assert ids(app) == before
 
 
-def test_that_several_pipes_are_marked_with_control_and_deleted_together(window, qtbot):
-    click(window, qtbot, 7)
-    click(window, qtbot, 9, CONTROL)
-    selection = window.document.selection
+def test_that_several_pipes_are_marked_with_control_and_deleted_together(app, qtbot):
+    click(app, qtbot, 7)
+    click(app, qtbot, 9, CONTROL)
+    selection = app.session.document.selection
     assert {selection.element_id, *selection.others} == {7, 9}
-    rows = window.panels.tree.view.selectionModel().selectedRows(NAME)
-    assert sorted(window.panels.tree.model.what(r)[2] for r in rows) == [7, 9]
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
-    assert not {7, 9} & set(ids(window))
+    rows = app.window.panels.tree.view.selectionModel().selectedRows(NAME)
+    assert sorted(app.window.panels.tree.model.what(r)[2] for r in rows) == [7, 9]
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_Delete)
+    assert not {7, 9} & set(ids(app))
 
 
-def test_that_a_plain_click_ends_a_selection_of_several(window, qtbot):
-    click(window, qtbot, 7)
-    click(window, qtbot, 9, CONTROL)
-    click(window, qtbot, 2)
-    assert window.document.selection == Selection(1, 2)
-    assert len(window.panels.tree.view.selectionModel().selectedRows(NAME)) == 1
-    click(window, qtbot, 7, CONTROL)
-    qtbot.keyClick(window, Qt.Key.Key_Escape)
-    assert window.document.selection.others == frozenset()
+def test_that_a_plain_click_ends_a_selection_of_several(app, qtbot):
+    click(app, qtbot, 7)
+    click(app, qtbot, 9, CONTROL)
+    click(app, qtbot, 2)
+    assert app.session.document.selection == Selection(1, 2)
+    assert len(app.window.panels.tree.view.selectionModel().selectedRows(NAME)) == 1
+    click(app, qtbot, 7, CONTROL)
+    qtbot.keyClick(app.window, Qt.Key.Key_Escape)
+    assert app.session.document.selection.others == frozenset()
 
 
-def test_that_a_range_that_leaves_the_elements_selects_one_thing(window, qtbot):
-    click(window, qtbot, 9)
-    view, model = window.panels.tree.view, window.panels.tree.model
+def test_that_a_range_that_leaves_the_elements_selects_one_thing(app, qtbot):
+    click(app, qtbot, 9)
+    view, model = app.window.panels.tree.view, app.window.panels.tree.model
     dent = model.index_of(0, Selection(1, 2, 1))
     view.scrollTo(dent)
     qtbot.mouseClick(view.viewport(), LEFT, SHIFT, view.visualRect(dent).center())
-    assert window.document.selection.deformation_id == 1
+    assert app.session.document.selection.deformation_id == 1
     qtbot.waitUntil(lambda: len(view.selectionModel().selectedRows(NAME)) == 1)
     assert model.what(view.currentIndex())[1:] == (NodeKind.DEFORMATION, 1)
 
 
-def test_that_f2_names_a_pipe_in_the_tree_and_the_name_shows_everywhere(window, qtbot):
-    click(window, qtbot, 2)
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_F2)
-    editor = window.panels.tree.view.findChild(QLineEdit)
+def test_that_f2_names_a_pipe_in_the_tree_and_the_name_shows_everywhere(app, qtbot):
+    click(app, qtbot, 2)
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_F2)
+    editor = app.window.panels.tree.view.findChild(QLineEdit)
     assert editor.text() == "Pipe 2"
     qtbot.keyClicks(editor, "Feed line")
     qtbot.keyClick(editor, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: window.document.result.element(2).label == "Feed line")
-    assert window.document.selection.element_id == 2
-    assert window.panels.docks["Element"].windowTitle().startswith("Feed line")
-    index = window.panels.tree.model.index_of(0, window.document.selection)
+    qtbot.waitUntil(lambda: app.session.document.result.element(2).label == "Feed line")
+    assert app.session.document.selection.element_id == 2
+    assert app.window.panels.docks["Element"].windowTitle().startswith("Feed line")
+    index = app.window.panels.tree.model.index_of(0, app.session.document.selection)
     assert index.data() == "Feed line"
-    assert window.history.undo_text == "Rename Pipe 2"
-    window.history.undo()
-    assert window.document.result.element(2).label == "Pipe 2"
+    assert app.session.history.undo_text == "Rename Pipe 2"
+    app.session.history.undo()
+    assert app.session.document.result.element(2).label == "Pipe 2"
 
 
-def test_that_f2_names_a_run_and_the_name_shows_everywhere(window, qtbot):
-    view, model = window.panels.tree.view, window.panels.tree.model
+def test_that_f2_names_a_run_and_the_name_shows_everywhere(app, qtbot):
+    view, model = app.window.panels.tree.view, app.window.panels.tree.model
     row = model.index_of(0, Selection(run_id=1))
-    n_elements = len(window.panels.tree.model._node(row).elements)
+    n_elements = len(app.window.panels.tree.model._node(row).elements)
     view.scrollTo(row)
     qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(row).center())
     qtbot.keyClick(view, Qt.Key.Key_F2)
@@ -125,39 +127,39 @@ def test_that_f2_names_a_run_and_the_name_shows_everywhere(window, qtbot):
     assert editor.text() == "Run 1"
     qtbot.keyClicks(editor, "Cooling water")
     qtbot.keyClick(editor, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: window.document.result.run_names == {1: "Cooling water"})
-    assert window.document.selection == Selection(run_id=1)
+    qtbot.waitUntil(lambda: app.session.document.result.run_names == {1: "Cooling water"})
+    assert app.session.document.selection == Selection(run_id=1)
     assert model.index_of(0, Selection(run_id=1)).data() == f"Cooling water ({n_elements})"
-    assert window.panels.docks["Element"].windowTitle() == "Cooling water"
-    assert window.panels.properties.list.topLevelItem(0).text(0) == "Cooling water"
-    assert window.history.undo_text == "Rename Run 1"
-    window.history.undo()
+    assert app.window.panels.docks["Element"].windowTitle() == "Cooling water"
+    assert app.window.panels.properties.list.topLevelItem(0).text(0) == "Cooling water"
+    assert app.session.history.undo_text == "Rename Run 1"
+    app.session.history.undo()
     assert model.index_of(0, Selection(run_id=1)).data() == f"Run 1 ({n_elements})"
-    window.history.redo()
-    assert window.document.result.run_names == {1: "Cooling water"}
+    app.session.history.redo()
+    assert app.session.document.result.run_names == {1: "Cooling water"}
 
 
-def test_that_a_scan_is_renamed_without_moving_the_view(window, qtbot):
-    view, model = window.panels.tree.view, window.panels.tree.model
+def test_that_a_scan_is_renamed_without_moving_the_view(app, qtbot):
+    view, model = app.window.panels.tree.view, app.window.panels.tree.model
     row = model.index(0, NAME)
     view.scrollTo(row)
     qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(row).center())
-    key = window.parts.scene.state.scan_key
+    key = app.window.views.scene.state.scan_key
     qtbot.keyClick(view, Qt.Key.Key_F2)
     editor = view.findChild(QLineEdit)
     editor.selectAll()
     qtbot.keyClicks(editor, "Pump house")
     qtbot.keyClick(editor, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: window.document.scan.name == "Pump house")
-    assert window.parts.scene.state.scan_key == key
+    qtbot.waitUntil(lambda: app.session.document.scan.name == "Pump house")
+    assert app.window.views.scene.state.scan_key == key
 
 
-def test_that_branches_that_were_closed_stay_closed_when_rows_change(window, qtbot):
-    view, model = window.panels.tree.view, window.panels.tree.model
+def test_that_branches_that_were_closed_stay_closed_when_rows_change(app, qtbot):
+    view, model = app.window.panels.tree.view, app.window.panels.tree.model
     run = next(i for i in model.branches() if model.what(i)[1] is NodeKind.RUN)
     what = model.what(run)
     view.collapse(run)
-    click(window, qtbot, 7)
+    click(app, qtbot, 7)
     qtbot.keyClick(view, Qt.Key.Key_Delete)
     again = next(i for i in model.branches() if model.what(i) == what)
     assert not view.isExpanded(again)
@@ -165,81 +167,81 @@ def test_that_branches_that_were_closed_stay_closed_when_rows_change(window, qtb
     assert all(view.isExpanded(i) for i in others)
 
 
-def test_that_a_split_pipe_is_two_and_merged_again_is_one(window, qtbot):
-    before = ids(window)
-    click(window, qtbot, 7)
-    window.actions_["split"].trigger()
-    dialog = asked(window)
+def test_that_a_split_pipe_is_two_and_merged_again_is_one(app, qtbot):
+    before = ids(app)
+    click(app, qtbot, 7)
+    app.window.actions_["split"].trigger()
+    dialog = asked(app)
     assert dialog.doubleValue() == pytest.approx(
-        window.document.result.element(7).axis.length / 2, abs=0.001
+        app.session.document.result.element(7).axis.length / 2, abs=0.001
     )
     dialog.setDoubleValue(1.0)
     dialog.accept()
-    qtbot.waitUntil(lambda: not window.jobs.is_busy)
-    assert len(ids(window)) == len(before) + 1, window.panels.message.text.text()
-    new_id = ids(window)[-1]
-    result = window.document.result
+    qtbot.waitUntil(lambda: not app.session.jobs.is_busy)
+    assert len(ids(app)) == len(before) + 1, app.window.panels.message.text.text()
+    new_id = ids(app)[-1]
+    result = app.session.document.result
     assert result.element(7).axis.length == pytest.approx(1.0, abs=0.01)
-    assert window.document.selection.element_id in (7, new_id)
-    assert window.history.undo_text == "Split Pipe 7"
+    assert app.session.document.selection.element_id in (7, new_id)
+    assert app.session.history.undo_text == "Split Pipe 7"
 
-    click(window, qtbot, 7)
-    click(window, qtbot, new_id, CONTROL)
-    qtbot.waitUntil(window.actions_["merge"].isEnabled)
-    qtbot.keyClick(window, Qt.Key.Key_M, CONTROL)
-    qtbot.waitUntil(lambda: ids(window) == before)
-    assert window.document.selection.element_id == 7
-    assert "Merge Pipe 7" in window.panels.message.text.text()
-    window.history.undo()
-    window.history.undo()
-    assert window.document.result is not result
-    assert ids(window) == before
-
-
-def test_that_pipes_that_cannot_be_merged_are_told_and_nothing_changes(window, qtbot):
-    result = window.document.result
-    click(window, qtbot, 7)
-    click(window, qtbot, 9, CONTROL)
-    window.actions_["merge"].trigger()
-    qtbot.waitUntil(lambda: not window.jobs.is_busy)
-    assert "not of one size" in window.panels.message.text.text()
-    assert window.panels.message.property("severity") == "error"
-    assert window.document.result is result
+    click(app, qtbot, 7)
+    click(app, qtbot, new_id, CONTROL)
+    qtbot.waitUntil(app.window.actions_["merge"].isEnabled)
+    qtbot.keyClick(app.window, Qt.Key.Key_M, CONTROL)
+    qtbot.waitUntil(lambda: ids(app) == before)
+    assert app.session.document.selection.element_id == 7
+    assert "Merge Pipe 7" in app.window.panels.message.text.text()
+    app.session.history.undo()
+    app.session.history.undo()
+    assert app.session.document.result is not result
+    assert ids(app) == before
 
 
-def test_that_an_edit_of_what_was_changed_meanwhile_is_dropped(window, qtbot):
-    click(window, qtbot, 7)
-    window.actions_["split"].trigger()
-    asked(window).accept()
-    assert window.jobs.is_busy
-    click(window, qtbot, 9)
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
-    kept = window.document.result
-    qtbot.waitUntil(lambda: not window.jobs.is_busy)
-    assert window.document.result is kept
-    assert "dropped" in window.panels.message.text.text()
+def test_that_pipes_that_cannot_be_merged_are_told_and_nothing_changes(app, qtbot):
+    result = app.session.document.result
+    click(app, qtbot, 7)
+    click(app, qtbot, 9, CONTROL)
+    app.window.actions_["merge"].trigger()
+    qtbot.waitUntil(lambda: not app.session.jobs.is_busy)
+    assert "not of one size" in app.window.panels.message.text.text()
+    assert app.window.panels.message.property("severity") == "error"
+    assert app.session.document.result is result
 
 
-def test_that_a_nominal_size_is_chosen_from_the_catalogue(window, qtbot):
-    click(window, qtbot, 2)
-    window.actions_["size"].trigger()
-    dialog = asked(window)
+def test_that_an_edit_of_what_was_changed_meanwhile_is_dropped(app, qtbot):
+    click(app, qtbot, 7)
+    app.window.actions_["split"].trigger()
+    asked(app).accept()
+    assert app.session.jobs.is_busy
+    click(app, qtbot, 9)
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_Delete)
+    kept = app.session.document.result
+    qtbot.waitUntil(lambda: not app.session.jobs.is_busy)
+    assert app.session.document.result is kept
+    assert "dropped" in app.window.panels.message.text.text()
+
+
+def test_that_a_nominal_size_is_chosen_from_the_catalogue(app, qtbot):
+    click(app, qtbot, 2)
+    app.window.actions_["size"].trigger()
+    dialog = asked(app)
     assert dialog.textValue().startswith("DN 150")
     dialog.setTextValue(next(t for t in dialog.comboBoxItems() if t.startswith("DN 200")))
     dialog.accept()
-    assert window.document.result.element(2).nominal.name.startswith("DN 200")
-    assert window.history.undo_text == "Change size of Pipe 2"
+    assert app.session.document.result.element(2).nominal.name.startswith("DN 200")
+    assert app.session.history.undo_text == "Change size of Pipe 2"
 
 
-def test_that_a_kind_is_chosen_and_measured_as_such(window, qtbot):
-    click(window, qtbot, 2)
-    window.actions_["kind"].trigger()
-    dialog = asked(window)
+def test_that_a_kind_is_chosen_and_measured_as_such(app, qtbot):
+    click(app, qtbot, 2)
+    app.window.actions_["kind"].trigger()
+    dialog = asked(app)
     assert "torus" not in dialog.comboBoxItems()
     dialog.setTextValue("flange")
     dialog.accept()
-    qtbot.waitUntil(lambda: window.document.result.element(2).kind == "flange")
-    assert not window.document.result.deformations_of(2)
+    qtbot.waitUntil(lambda: app.session.document.result.element(2).kind == "flange")
+    assert not app.session.document.result.deformations_of(2)
 
 
 @pytest.mark.parametrize(
@@ -250,50 +252,50 @@ def test_that_a_kind_is_chosen_and_measured_as_such(window, qtbot):
         (Selection(1, 2, 1), {"Accept deformation", "Reject deformation"}, True),
     ],
 )
-def test_that_a_row_offers_what_can_be_done_with_it(window, qtbot, row, wanted, enabled):
-    tree = window.panels.tree
+def test_that_a_row_offers_what_can_be_done_with_it(app, qtbot, row, wanted, enabled):
+    tree = app.window.panels.tree
     index = tree.model.index_of(0, row)
     tree.view.scrollTo(index)
     centre = tree.view.visualRect(index).center()
     qtbot.mouseClick(tree.view.viewport(), LEFT, pos=centre)
     tree.view.customContextMenuRequested.emit(centre)
-    menu = window.findChild(QMenu, "context")
+    menu = app.window.findChild(QMenu, "context")
     offered = {a.text(): a.isEnabled() for a in menu.actions()}
     assert wanted <= set(offered)
     assert all(offered[text] is enabled for text in wanted)
     menu.close()
 
 
-def test_that_reviewing_from_the_menu_is_undone_step_by_step(window, qtbot):
-    window.panels.table.chosen.emit(3)
-    window.actions_["reject"].trigger()
-    assert window.document.scan.review(3).state is ReviewState.REJECTED
-    qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
-    assert window.document.scan.review(3).state is ReviewState.OPEN
+def test_that_reviewing_from_the_menu_is_undone_step_by_step(app, qtbot):
+    app.window.panels.table.chosen.emit(3)
+    app.window.actions_["reject"].trigger()
+    assert app.session.document.scan.review(3).state is ReviewState.REJECTED
+    qtbot.keyClick(app.window, Qt.Key.Key_Z, CONTROL)
+    assert app.session.document.scan.review(3).state is ReviewState.OPEN
 
 
-def test_that_hidden_and_reviewed_things_stay_so_when_another_pipe_goes(window, qtbot):
-    click(window, qtbot, 9)
-    window.actions_["hide"].trigger()
-    window.panels.table.chosen.emit(1)
-    window.actions_["accept"].trigger()
-    click(window, qtbot, 7)
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
-    assert window.document.view.hidden_elements == {9}
-    assert window.document.scan.review(1).state is ReviewState.ACCEPTED
+def test_that_hidden_and_reviewed_things_stay_so_when_another_pipe_goes(app, qtbot):
+    click(app, qtbot, 9)
+    app.window.actions_["hide"].trigger()
+    app.window.panels.table.chosen.emit(1)
+    app.window.actions_["accept"].trigger()
+    click(app, qtbot, 7)
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_Delete)
+    assert app.session.document.view.hidden_elements == {9}
+    assert app.session.document.scan.review(1).state is ReviewState.ACCEPTED
 
 
-def test_that_detecting_in_a_box_needs_a_box_and_keeps_the_rest(window, qtbot):
-    assert not window.actions_["detect_in_box"].isEnabled()
+def test_that_detecting_in_a_box_needs_a_box_and_keeps_the_rest(app, qtbot):
+    assert not app.window.actions_["detect_in_box"].isEnabled()
     from pipegui.model import commands
 
-    pipe = window.document.result.element(7)
+    pipe = app.session.document.result.element(7)
     low, high = sorted([tuple(pipe.axis.start - 0.3), tuple(pipe.axis.end + 0.3)])
-    window.do(commands.set_view, clip_box=Box(low, high))
-    others = [e for e in window.document.result.elements if e.element_id not in (7, 9)]
-    window.actions_["detect_in_box"].trigger()
-    qtbot.waitUntil(lambda: window.history.undo_text == "Detect again in the box")
-    assert all(e in window.document.result.elements for e in others if e.element_id < 7)
+    app.session.do(commands.set_view, clip_box=Box(low, high))
+    others = [e for e in app.session.document.result.elements if e.element_id not in (7, 9)]
+    app.window.actions_["detect_in_box"].trigger()
+    qtbot.waitUntil(lambda: app.session.history.undo_text == "Detect again in the box")
+    assert all(e in app.session.document.result.elements for e in others if e.element_id < 7)
 
 
 def test_that_the_model_keeps_its_promises_while_rows_come_and_go(qtbot):

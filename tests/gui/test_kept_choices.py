@@ -6,14 +6,14 @@ import pytest
 from PySide6.QtCore import QSettings, Qt
 from PySide6.QtWidgets import QTabWidget
 
-from pipegui.controllers.remembered_choices import keep, keep_tab
+from pipegui.controllers.remembered_choices import remember_choices, remember_tab
 from pipegui.panels.deformation_table import DeformationTable
 from pipegui.plots.deviation_map import DeviationMapView
 from pipegui.plots.preview_view import PreviewView
 from pipegui.plots.radius_plot import AT_FIRST, RadiusPlot
 from pipegui.plots.section_view import SectionView
 from pipegui.states.view_state import TableState
-from pipegui.window.views import Parts
+from pipegui.window.views import Views
 from tests.factories import make_result
 from tests.gui.fakes import FakeScene
 
@@ -24,56 +24,56 @@ def stored(tmp_path):
 
 
 @pytest.fixture
-def start_again(make_window, qtbot):
+def start_again(make_app, qtbot):
     """Close the window, if there is one, and return a new one with the real plots."""
-    windows = []
+    apps = []
 
     def start():
-        while windows:
-            old = windows.pop()
-            old.projects.discard()
-            old.close()
-            old.stored.sync()
-        parts = Parts(FakeScene(), RadiusPlot(), SectionView(), DeviationMapView(), PreviewView())
-        windows.append(make_window(parts=parts))
-        windows[0].open_files([Path("plant.laz")])
-        qtbot.waitUntil(lambda: windows[0].document.scan is not None)
-        windows[0].detect()
-        qtbot.waitUntil(lambda: windows[0].document.result is not None)
-        return windows[0]
+        while apps:
+            old = apps.pop()
+            old.controllers.project.discard_changes()
+            old.window.close()
+            old.session.stored.sync()
+        views = Views(FakeScene(), RadiusPlot(), SectionView(), DeviationMapView(), PreviewView())
+        apps.append(make_app(views=views))
+        apps[0].controllers.scans.open_files([Path("plant.laz")])
+        qtbot.waitUntil(lambda: apps[0].session.document.scan is not None)
+        apps[0].controllers.scans.detect()
+        qtbot.waitUntil(lambda: apps[0].session.document.result is not None)
+        return apps[0]
 
     return start
 
 
 def test_that_plots_are_as_they_were_left(start_again):
-    window = start_again()
-    radius, section = window.parts.radius_plot, window.parts.section
+    app = start_again()
+    radius, section = app.window.views.radius_plot, app.window.views.section
     radius.shown_menu.series["free_radius"].trigger()
     radius.shown_menu.series["ovality"].trigger()
     radius.x_axis.setCurrentIndex(1)
     section.layer_menu.series["nominal"].trigger()
     section.factor.setValue(7)
-    window.panels.plots.setCurrentWidget(section)
+    app.window.panels.plots.setCurrentWidget(section)
 
-    window = start_again()
-    radius, section = window.parts.radius_plot, window.parts.section
+    app = start_again()
+    radius, section = app.window.views.radius_plot, app.window.views.section
     assert set(radius.shown_menu.shown) == AT_FIRST - {"ovality"} | {"free_radius"}
     assert not radius.ovality.isVisible()
     assert radius.x_axis.currentText() == "Chainage"
     assert radius.radius.getAxis("bottom").labelText != "Profile index"
     assert section.layer_menu.shows("nominal")
     assert (section.factor.value(), section.factor_text.text()) == (7, "7×")
-    assert window.panels.plots.currentWidget() is section
+    assert app.window.panels.plots.currentWidget() is section
 
 
 def test_that_filters_and_columns_are_as_they_were_left(start_again, qtbot):
-    table = start_again().panels.table
+    table = start_again().window.panels.table
     qtbot.keyClicks(table.filters.kind, "dent")
     table.filters.min_depth.setValue(10.0)
     table.columns.actions["area_cm2"].trigger()
     shown = table.filters.counts.text(), table.columns.shown
 
-    table = start_again().panels.table
+    table = start_again().window.panels.table
     assert table.filters.kind.currentText() == "dent"
     assert table.filters.min_depth.value() == 10.0
     assert table.proxy.rowCount() == 1
@@ -113,7 +113,7 @@ def test_that_choices_of_another_version_do_no_harm(qtbot, no_leaks, stored, tex
     choosers = parts | {"columns": table.columns, "filters": table.filters}
     for name in choosers:
         stored.setValue(f"choices/{name}", text)
-    keep(stored, choosers)
+    remember_choices(stored, choosers)
     assert parts["radius"].x_axis.currentIndex() == 0
     assert parts["section"].factor.value() == 1
     assert table.filters.choices() == {
@@ -129,7 +129,7 @@ def test_that_a_tab_of_another_version_does_no_harm(qtbot, stored):
     qtbot.addWidget(tabs)
     tabs.setObjectName("plots")
     stored.setValue("choices/plots", "left")
-    keep_tab(stored, tabs)
+    remember_tab(stored, tabs)
     stored.setValue("choices/plots", 17)
-    keep_tab(stored, tabs)
+    remember_tab(stored, tabs)
     assert tabs.currentIndex() == -1

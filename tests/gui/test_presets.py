@@ -157,13 +157,13 @@ def test_that_fields_stay_where_they_are_when_one_is_changed(form):
     assert field.geometry() == before
 
 
-def test_that_a_preset_in_the_window_is_one_step_that_can_be_undone(window, qtbot):
-    window.panels.docks["Settings"].raise_()
-    bar = window.panels.settings.presets
+def test_that_a_preset_in_the_window_is_one_step_that_can_be_undone(app, qtbot):
+    app.window.panels.docks["Settings"].raise_()
+    bar = app.window.panels.settings.presets
     row = bar.choice.findText("Large pipes")
     bar.choice.setCurrentIndex(row)
     bar._choose(row)
-    assert window.document.settings.elements.min_radius_mm == 100.0
-    window.actions_["undo"].trigger()
-    assert window.document.settings == Settings()
+    assert app.session.document.settings.elements.min_radius_mm == 100.0
+    app.window.actions_["undo"].trigger()
+    assert app.session.document.settings == Settings()
     assert bar.choice.currentText() == STANDARD

@@ -13,9 +13,9 @@ from pipegui.model import commands
 from pipegui.model.document import Document, Measurement, Scan, Tool
 from pipegui.panels.stacks_panel import NAME, PROFILES, SHARE, StacksPanel
 from pipegui.plots.preview_view import PreviewView, summary_of, upright
-from pipegui.states.preview_state import PlanState, PreviewState
+from pipegui.states.preview_state import PlanningState, PlanState, PreviewState
 from pipegui.states.view_state import resolve
-from pipegui.work.job_queue import Jobs
+from pipegui.work.job_queue import JobQueue
 from pipegui.work.previews import Previews
 from tests.factories import make_cloud
 from tests.gui.patience import PATIENCE_S
@@ -49,20 +49,20 @@ def shown(qtbot, widget, size=(420, 480)):
 
 @pytest.fixture
 def jobs(qtbot, no_leaks):
-    jobs = Jobs(read=lambda *_: CLOUD, detect=lambda *_: "result")
+    jobs = JobQueue(read=lambda *_: CLOUD, detect=lambda *_: "result")
     yield jobs
     jobs.close()
 
 
-def test_that_a_glance_is_told_to_its_caller_only(jobs, qtbot):
+def test_that_idle_work_is_told_to_its_caller_only(jobs, qtbot):
     told, spies = [], [QSignalSpy(s) for s in (jobs.started, jobs.ended, jobs.cancelled)]
-    jobs.glance(lambda progress: 42, told.append, told.append)
+    jobs.run_when_idle(lambda progress: 42, told.append, told.append)
     assert not jobs.is_busy
     qtbot.waitUntil(lambda: told == [42])
     assert [spy.count() for spy in spies] == [0, 0, 0]
 
 
-def test_that_a_glance_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
+def test_that_idle_work_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
     told, running = [], threading.Event()
 
     def slow(progress):
@@ -74,30 +74,32 @@ def test_that_a_glance_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
     def quick(progress):
         return slow(progress) if not running.is_set() else "again"
 
-    jobs.glance(quick, told.append, told.append)
+    jobs.run_when_idle(quick, told.append, told.append)
     assert running.wait(PATIENCE_S)
     started = QSignalSpy(jobs.started)
     with qtbot.waitSignal(jobs.detected):
         jobs.detect(CLOUD, Settings())
-        assert jobs.is_busy  # though it has to wait for the glance to end
+        assert jobs.is_busy  # though it has to wait for the idle work to end
     assert [started.at(i) for i in range(started.count())] == [["Detecting"]]
     qtbot.waitUntil(lambda: told == ["again"])
 
 
-def test_that_a_newer_glance_replaces_one_that_waits(jobs, qtbot):
+def test_that_newer_idle_work_replaces_what_waits(jobs, qtbot):
     told, release = [], threading.Event()
     jobs._detect = lambda *_: release.wait(PATIENCE_S)
     jobs.detect(CLOUD, Settings())
-    jobs.glance(lambda _: "old", told.append, told.append)
-    jobs.glance(lambda _: "new", told.append, told.append)
+    jobs.run_when_idle(lambda _: "old", told.append, told.append)
+    jobs.run_when_idle(lambda _: "new", told.append, told.append)
     release.set()
     qtbot.waitUntil(lambda: told == ["new"])
 
 
-def test_that_a_glance_that_fails_says_why(jobs, qtbot):
+def test_that_idle_work_that_fails_says_why(jobs, qtbot):
     none = Settings().replace({"stacks.preset": "none"})
     told = []
-    jobs.glance(lambda p: plan_stacks(CLOUD, none, p), lambda _: told.append("?"), told.append)
+    jobs.run_when_idle(
+        lambda p: plan_stacks(CLOUD, none, p), lambda _: told.append("?"), told.append
+    )
     qtbot.waitUntil(lambda: bool(told))
     assert "no stacks to cut" in told[0]
 
@@ -125,7 +127,7 @@ class Seen:
 
 def test_that_nothing_is_planned_while_nobody_looks(jobs, qtbot):
     seen = Seen(jobs)
-    seen.previews.apply(CLOUD, AXES)
+    seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.wait(500)
     assert seen.plan is None
     seen.previews.watch_list(True)
@@ -137,7 +139,7 @@ def test_that_nothing_is_planned_while_nobody_looks(jobs, qtbot):
 def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
     seen = Seen(jobs)
     seen.previews.watch_profile(True)
-    seen.previews.apply(CLOUD, AXES)
+    seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.waitUntil(lambda: seen.profile is not None)
     first = seen.profile
     assert first.profile_index == seen.plan.stacks[0].fullest
@@ -150,7 +152,7 @@ def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
     assert seen.profile.stack.name == "Z"
     before = seen.profile
     by_proximity = AXES.replace({"profiles.method": "proximity", "profiles.gap_mm": 500.0})
-    seen.previews.apply(CLOUD, by_proximity)
+    seen.previews.apply(PlanningState(CLOUD, by_proximity))
     qtbot.waitUntil(lambda: seen.profile is not None and seen.profile is not before)
     assert seen.plan is seen.plans[-1].plan  # the stacks are the same
     assert seen.profile.n_curves < before.n_curves
@@ -159,7 +161,7 @@ def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
 def test_that_steps_end_at_the_ends(jobs, qtbot):
     seen = Seen(jobs)
     seen.previews.watch_profile(True)
-    seen.previews.apply(CLOUD, AXES)
+    seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.waitUntil(lambda: seen.profile is not None)
     seen.previews.step(10**6)
     assert seen.profiles[-1].index == seen.plan.stacks[0].last
@@ -170,8 +172,8 @@ def test_that_steps_end_at_the_ends(jobs, qtbot):
 def test_that_a_closed_scan_is_forgotten(jobs, qtbot):
     seen = Seen(jobs)
     seen.previews.watch_list(True)
-    seen.previews.apply(CLOUD, AXES)
-    seen.previews.apply(None, AXES)
+    seen.previews.apply(PlanningState(CLOUD, AXES))
+    seen.previews.apply(PlanningState(None, AXES))
     qtbot.wait(600)
     assert seen.plan is None
     assert seen.plans[-1] == PlanState()
@@ -260,17 +262,17 @@ def test_that_points_picked_for_other_ends_are_left_alone(qtbot, document):
 
 
 def test_that_in_the_window_two_clicks_make_a_stack(detected, qtbot):
-    stacks = detected.panels.stacks
-    detected.actions_["add_stack"].trigger()
+    stacks = detected.window.panels.stacks
+    detected.window.actions_["add_stack"].trigger()
     stacks.editor.from_points.click()
-    assert detected.document.view.tool is Tool.MEASURE
-    xyz = detected.document.scan.cloud.xyz
-    detected.parts.scene.picked.emit(0)
-    detected.parts.scene.picked.emit(len(xyz) - 1)
-    qtbot.waitUntil(lambda: detected.document.view.tool is Tool.SELECT)
-    assert detected.document.view.measurements == ()
+    assert detected.session.document.view.tool is Tool.MEASURE
+    xyz = detected.session.document.scan.cloud.xyz
+    detected.window.views.scene.picked.emit(0)
+    detected.window.views.scene.picked.emit(len(xyz) - 1)
+    qtbot.waitUntil(lambda: detected.session.document.view.tool is Tool.SELECT)
+    assert detected.session.document.view.measurements == ()
     stacks.editor.accept_button.click()
-    direction = np.array(detected.document.settings.stacks.directions[0])
+    direction = np.array(detected.session.document.settings.stacks.directions[0])
     offset = xyz[-1] - xyz[0]
     assert direction == pytest.approx(offset / np.linalg.norm(offset), abs=1e-3)
 

@@ -15,7 +15,7 @@ from pipecore.io import write_laz
 from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Dent, Run, Straight
 from pipegui.model.document import Selection
-from pipegui.window.views import make_parts
+from pipegui.window.views import make_views
 from pipegui.work.job_queue import detect_pipes, read_file
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
@@ -36,85 +36,85 @@ def laz(tmp_path_factory) -> Path:
     return path
 
 
-def is_idle(window) -> bool:
-    return not window.jobs.is_busy and not window.projects.saving.is_busy
+def is_idle(app) -> bool:
+    return not app.session.jobs.is_busy and not app.controllers.project.saving.is_busy
 
 
-def click(window, qtbot, element_id: int, modifier=Qt.KeyboardModifier.NoModifier) -> None:
-    view = window.panels.tree.view
-    index = window.panels.tree.model.index_of(0, Selection(element_id=element_id))
+def click(app, qtbot, element_id: int, modifier=Qt.KeyboardModifier.NoModifier) -> None:
+    view = app.window.panels.tree.view
+    index = app.window.panels.tree.model.index_of(0, Selection(element_id=element_id))
     view.scrollTo(index)
     qtbot.mouseClick(view.viewport(), LEFT, modifier, view.visualRect(index).center())
 
 
 def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
-    make_window, qtbot, laz, tmp_path, monkeypatch
+    make_app, qtbot, laz, tmp_path, monkeypatch
 ):
     def opened():
-        window = make_window(read=read_file, detect=detect_pipes, parts=make_parts())
-        window.actions_["fly"].setChecked(False)
-        return window
+        app = make_app(read=read_file, detect=detect_pipes, views=make_views())
+        app.window.actions_["fly"].setChecked(False)
+        return app
 
-    window = opened()
-    window.open_files([laz])
-    qtbot.waitUntil(window.actions_["detect"].isEnabled)
-    qtbot.keyClick(window, Qt.Key.Key_D, CONTROL)
-    qtbot.waitUntil(lambda: window.document.result is not None and is_idle(window))
-    result = window.document.result
+    app = opened()
+    app.controllers.scans.open_files([laz])
+    qtbot.waitUntil(app.window.actions_["detect"].isEnabled)
+    qtbot.keyClick(app.window, Qt.Key.Key_D, CONTROL)
+    qtbot.waitUntil(lambda: app.session.document.result is not None and is_idle(app))
+    result = app.session.document.result
     [dent] = [d for d in result.deformations if d.kind == "dent"]
     dented = dent.element_id
     [thin] = [e.element_id for e in result.elements if e.radius < 0.08]
-    assert window.document.selection.deformation_id == dent.deformation_id
+    assert app.session.document.selection.deformation_id == dent.deformation_id
 
     # Split the dented pipe, see that the dent is still there, and make it one again.
-    click(window, qtbot, dented)
-    window.actions_["split"].trigger()
-    dialog = window.findChild(QInputDialog, "ask")
+    click(app, qtbot, dented)
+    app.window.actions_["split"].trigger()
+    dialog = app.window.findChild(QInputDialog, "ask")
     dialog.setDoubleValue(0.6)
     dialog.accept()
-    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Split"))
-    parts = [e.element_id for e in window.document.result.elements if e.radius > 0.08]
+    qtbot.waitUntil(lambda: app.session.history.undo_text.startswith("Split"))
+    parts = [e.element_id for e in app.session.document.result.elements if e.radius > 0.08]
     assert len(parts) == 2
-    depths = [1000 * d.depth for d in window.document.result.deformations if d.kind == "dent"]
+    depths = [1000 * d.depth for d in app.session.document.result.deformations if d.kind == "dent"]
     assert depths == pytest.approx([1000 * dent.depth], rel=0.1)
-    click(window, qtbot, parts[0])
-    click(window, qtbot, parts[1], CONTROL)
-    qtbot.keyClick(window, Qt.Key.Key_M, CONTROL)
-    qtbot.waitUntil(lambda: window.history.undo_text.startswith("Merge"))
-    merged = window.document.result.element(parts[0])
+    click(app, qtbot, parts[0])
+    click(app, qtbot, parts[1], CONTROL)
+    qtbot.keyClick(app.window, Qt.Key.Key_M, CONTROL)
+    qtbot.waitUntil(lambda: app.session.history.undo_text.startswith("Merge"))
+    merged = app.session.document.result.element(parts[0])
     assert merged.radius == pytest.approx(result.element(dented).radius, abs=0.0003)
     for _ in range(2):
-        qtbot.keyClick(window, Qt.Key.Key_Z, CONTROL)
-    assert window.document.result is result
+        qtbot.keyClick(app.window, Qt.Key.Key_Z, CONTROL)
+    assert app.session.document.result is result
 
     # Delete the other pipe, reject the dent with a word, and save.
-    click(window, qtbot, thin)
-    qtbot.keyClick(window.panels.tree.view, Qt.Key.Key_Delete)
-    window.panels.table.chosen.emit(dent.deformation_id)
-    window.actions_["reject"].trigger()
-    window.panels.table.commented.emit(dent.deformation_id, "cut out")
+    click(app, qtbot, thin)
+    qtbot.keyClick(app.window.panels.tree.view, Qt.Key.Key_Delete)
+    app.window.panels.table.chosen.emit(dent.deformation_id)
+    app.window.actions_["reject"].trigger()
+    app.window.panels.table.commented.emit(dent.deformation_id, "cut out")
     path = tmp_path / "job.pipegui"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(path), ""))
-    window.parts.scene.set_standard_view("top")
-    camera = window.parts.scene.camera()
-    qtbot.keyClick(window, Qt.Key.Key_S, CONTROL)
-    qtbot.waitUntil(lambda: path.is_file() and is_idle(window))
-    assert window.close()
+    app.window.views.scene.set_standard_view("top")
+    camera = app.window.views.scene.camera()
+    qtbot.keyClick(app.window, Qt.Key.Key_S, CONTROL)
+    qtbot.waitUntil(lambda: path.is_file() and is_idle(app))
+    assert app.window.close()
 
     # Another day.
     again = opened()
-    again.open_files([path])
-    qtbot.waitUntil(lambda: again.document.scan is not None and is_idle(again))
-    assert [e.element_id for e in again.document.result.elements] == [
+    again.controllers.scans.open_files([path])
+    qtbot.waitUntil(lambda: again.session.document.scan is not None and is_idle(again))
+    assert [e.element_id for e in again.session.document.result.elements] == [
         e.element_id for e in result.elements if e.element_id != thin
     ]
-    now = again.parts.scene.camera()
+    now = again.window.views.scene.camera()
     assert {k: np.round(v, 6).tolist() for k, v in now.items()} == {
         k: np.round(v, 6).tolist() for k, v in camera.items()
     }
     table = tmp_path / "deformations.csv"
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_: (str(table), ""))
-    again.actions_["export_deformations"].trigger()
+    again.window.actions_["export_deformations"].trigger()
     with table.open(encoding="utf-8", newline="") as file:
         rows = {int(r["deformation_id"]): r for r in csv.DictReader(file)}
     row = rows[dent.deformation_id]
@@ -131,26 +131,26 @@ KILLED = """
     from pipecore.io import read
     from pipegui.model import element_commands
     from pipegui.model.document import Scan
-    from pipegui.work.job_queue import Jobs
-    from pipegui.window.main_window import MainWindow
+    from pipegui.composition import compose
+    from pipegui.work.job_queue import JobQueue
     from tests.factories import make_scan
-    from tests.gui.fakes import make_fake_parts
+    from tests.gui.fakes import make_fake_views
 
     laz, folder = map(Path, sys.argv[1:])
-    app = QApplication([])
+    qt = QApplication([])
     stored = QSettings(str(folder / "layout.ini"), QSettings.Format.IniFormat)
-    window = MainWindow(make_fake_parts(), Jobs(), stored, folder)
+    app = compose(make_fake_views(), JobQueue(), stored, folder)
     cloud = read(laz)
     result = replace(make_scan(len(cloud))[1], source=laz, origin=cloud.origin)
-    window.take_scan(Scan(laz.name, cloud))
-    window.take_result(cloud, result)
-    window.do(element_commands.rename_element, 2, "Feed line")
-    window.projects.rescue.keep(then=lambda: os.kill(os.getpid(), signal.SIGKILL))
-    app.exec()
+    app.controllers.scans.on_scan_read(Scan(laz.name, cloud))
+    app.controllers.scans.on_detected(cloud, result)
+    app.session.do(element_commands.rename_element, 2, "Feed line")
+    app.controllers.autosave.save_copy(then=lambda: os.kill(os.getpid(), signal.SIGKILL))
+    qt.exec()
 """
 
 
-def test_that_work_outlives_a_process_that_was_killed(make_window, qtbot, tmp_path):
+def test_that_work_outlives_a_process_that_was_killed(make_app, qtbot, tmp_path):
     from tests.factories import make_scan
 
     laz, folder = tmp_path / "plant.laz", tmp_path / "unsaved"
@@ -163,11 +163,11 @@ def test_that_work_outlives_a_process_that_was_killed(make_window, qtbot, tmp_pa
         check=False,
     )
     assert killed.returncode == -9, killed.stderr
-    window = make_window(read=read_file, rescue=folder)
-    window.projects.rescue.offer()
-    restore, _ = window.panels.message.answer_buttons
+    app = make_app(read=read_file, copies=folder)
+    app.controllers.autosave.offer_recovery()
+    restore, _ = app.window.panels.message.answer_buttons
     qtbot.mouseClick(restore, LEFT)
-    qtbot.waitUntil(lambda: window.document.result is not None)
-    assert window.document.result.element(2).label == "Feed line"
-    assert window.isWindowModified()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    assert app.session.document.result.element(2).label == "Feed line"
+    assert app.window.isWindowModified()
     qtbot.waitUntil(lambda: len(list(folder.glob("*.pipegui"))) == 1)

@@ -95,17 +95,17 @@ def test_that_counts_take_their_form(german):
 
 
 @pytest.mark.usefixtures("german")
-def test_that_every_menu_has_a_key_of_its_own(make_window):
-    titles = [a.text() for a in make_window().menuBar().actions()]
+def test_that_every_menu_has_a_key_of_its_own(make_app):
+    titles = [a.text() for a in make_app().window.menuBar().actions()]
     keys = [title[title.index("&") + 1].lower() for title in titles]
     assert len(keys) == len(set(keys)), titles
 
 
-def said(window):
+def said(app):
     """All that a window says, with where it says it."""
-    for action in window.findChildren(QAction):
+    for action in app.window.findChildren(QAction):
         yield from ((action, text) for text in (action.text(), action.toolTip()))
-    for widget in window.findChildren(QWidget):
+    for widget in app.window.findChildren(QWidget):
         if widget.objectName().startswith("qt_"):  # Qt's own, with a catalogue of its own
             continue
         found = [widget.toolTip(), widget.accessibleName(), widget.statusTip()]
@@ -151,12 +151,12 @@ def reader(known):
     return lambda text: text in plain or any(p.fullmatch(text) for p in patterns)
 
 
-def english_in(window):
+def english_in(app):
     """Texts of the catalogue that a window says in English, with where."""
     kept = [pair for m in catalogue.read("de") if m.id for pair in forms(m)]
     is_english, is_german = (reader([pair[i] for pair in kept]) for i in (0, 1))
     left = []
-    for place, text in said(window):
+    for place, text in said(app):
         for line in (text, *str(text).splitlines()):
             plain = re.sub(r" \([^()]*\)$", "", str(line)).replace("&", "").strip()
             if is_english(plain) and not is_german(plain):
@@ -165,40 +165,40 @@ def english_in(window):
 
 
 @pytest.mark.usefixtures("german")
-def test_that_the_empty_window_is_german_too(make_window):
-    assert not english_in(make_window())
+def test_that_the_empty_window_is_german_too(make_app):
+    assert not english_in(make_app())
 
 
 @pytest.mark.usefixtures("german")
-def test_that_nothing_english_is_left_in_the_german_window(make_window):
+def test_that_nothing_english_is_left_in_the_german_window(make_app):
     from pipegui.plots.deviation_map import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView
-    from tests.gui.fakes import make_fake_parts
+    from tests.gui.fakes import make_fake_views
 
-    parts = make_fake_parts()
-    parts.radius_plot, parts.section = RadiusPlot(), SectionView()
-    parts.map, parts.preview = DeviationMapView(), PreviewView()
-    window = make_window(parts=parts)
+    views = make_fake_views()
+    views.radius_plot, views.section = RadiusPlot(), SectionView()
+    views.map, views.preview = DeviationMapView(), PreviewView()
+    app = make_app(views=views)
     cloud, result = make_scan()
     result = replace(result)  # What was told of a result is kept; of this one nothing was told.
-    window.do(commands.open_scan, Scan("plant.laz", cloud))
-    window.take_result(cloud, result)
-    window.do(view_commands.clip_to_scan)
-    assert not english_in(window)
-    assert window.actions_["undo"].text() == "Rückgängig: Erkennen"
-    assert window.panels.docks["Deformations"].windowTitle() == "Verformungen"
-    assert window.panels.message.text.text().startswith("5 Rohre in 3 Rohrsträngen, 4 Verform")
+    app.session.do(commands.open_scan, Scan("plant.laz", cloud))
+    app.controllers.scans.on_detected(cloud, result)
+    app.session.do(view_commands.clip_to_scan)
+    assert not english_in(app)
+    assert app.window.actions_["undo"].text() == "Rückgängig: Erkennen"
+    assert app.window.panels.docks["Deformations"].windowTitle() == "Verformungen"
+    assert app.window.panels.message.text.text().startswith("5 Rohre in 3 Rohrsträngen, 4 Verform")
 
 
-def test_that_a_choice_is_kept_and_said(make_window):
-    window = make_window()
-    window.actions_["language_de"].trigger()
-    assert window.stored.value("language") == "de"
+def test_that_a_choice_is_kept_and_said(make_app):
+    app = make_app()
+    app.window.actions_["language_de"].trigger()
+    assert app.session.stored.value("language") == "de"
     checked = [
-        c for c in texts.LANGUAGES if window.actions_[f"language_{c or 'system'}"].isChecked()
+        c for c in texts.LANGUAGES if app.window.actions_[f"language_{c or 'system'}"].isChecked()
     ]
     assert checked == ["de"]
-    assert window.panels.message.text.text() == "The language changes at the next start."
+    assert app.window.panels.message.text.text() == "The language changes at the next start."
     assert texts.language() == "en"

@@ -20,19 +20,19 @@ LEFT = Qt.MouseButton.LeftButton
 
 
 def test_that_the_clip_box_is_typed_in_world_coordinates(detected, qtbot):
-    bar = detected.panels.clip
+    bar = detected.window.panels.clip
     assert not bar.isVisible()
-    qtbot.keyClick(detected, Qt.Key.Key_B)
+    qtbot.keyClick(detected.window, Qt.Key.Key_B)
     assert bar.isVisible()
-    assert detected.actions_["clip"].isChecked()
-    origin = detected.document.scan.cloud.origin
-    before = detected.parts.scene.state.view.clip_box
+    assert detected.window.actions_["clip"].isChecked()
+    origin = detected.session.document.scan.cloud.origin
+    before = detected.window.views.scene.state.view.clip_box
     field = bar.ends[2][1]
     field.setFocus()
     field.selectAll()
     qtbot.keyClicks(field, f"{origin[2] + 1.5:.3f}")
     qtbot.keyClick(field, Qt.Key.Key_Return)
-    box = detected.parts.scene.state.view.clip_box
+    box = detected.window.views.scene.state.view.clip_box
     assert box.high[2] == pytest.approx(1.5, abs=1e-6)
     # Nothing else moves, not by what the fields round either.
     assert (box.low, box.high[:2]) == (before.low, before.high[:2])
@@ -40,36 +40,36 @@ def test_that_the_clip_box_is_typed_in_world_coordinates(detected, qtbot):
 
 
 def test_that_the_bar_clips_to_the_selection_and_back_and_off(detected, qtbot):
-    bar = detected.panels.clip
-    qtbot.keyClick(detected, Qt.Key.Key_B)
-    whole = detected.document.view.clip_box
+    bar = detected.window.panels.clip
+    qtbot.keyClick(detected.window, Qt.Key.Key_B)
+    whole = detected.session.document.view.clip_box
     qtbot.mouseClick(bar.selection, LEFT)
-    near = detected.document.view.clip_box
+    near = detected.session.document.view.clip_box
     assert np.subtract(near.high, near.low).prod() < np.subtract(whole.high, whole.low).prod()
     qtbot.mouseClick(bar.whole, LEFT)
-    assert detected.document.view.clip_box == whole
+    assert detected.session.document.view.clip_box == whole
     qtbot.mouseClick(bar.close_, LEFT)
-    assert detected.document.view.clip_box is None
+    assert detected.session.document.view.clip_box is None
     assert not bar.isVisible()
 
 
 def test_that_the_bar_and_the_menu_show_what_is_outside_of_the_box(detected, qtbot):
-    bar = detected.panels.clip
-    assert not detected.actions_["invert_clip"].isEnabled()
-    qtbot.keyClick(detected, Qt.Key.Key_B)
+    bar = detected.window.panels.clip
+    assert not detected.window.actions_["invert_clip"].isEnabled()
+    qtbot.keyClick(detected.window, Qt.Key.Key_B)
     qtbot.mouseClick(bar.selection, LEFT)
     qtbot.mouseClick(bar.invert, LEFT)
-    assert detected.parts.scene.state.view.clip_box.is_inverted
-    assert detected.actions_["invert_clip"].isChecked()
+    assert detected.window.views.scene.state.view.clip_box.is_inverted
+    assert detected.window.actions_["invert_clip"].isChecked()
     # Typing a number keeps the side.
     field = bar.ends[0][0]
     field.setFocus()
     field.selectAll()
     qtbot.keyClicks(field, f"{field.value() - 0.5:.2f}")
     qtbot.keyClick(field, Qt.Key.Key_Return)
-    assert detected.document.view.clip_box.is_inverted
-    qtbot.keyClick(detected, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
-    assert not detected.document.view.clip_box.is_inverted
+    assert detected.session.document.view.clip_box.is_inverted
+    qtbot.keyClick(detected.window, Qt.Key.Key_B, Qt.KeyboardModifier.ControlModifier)
+    assert not detected.session.document.view.clip_box.is_inverted
     assert not bar.invert.isChecked()
 
 
@@ -93,69 +93,69 @@ def test_that_the_numbers_of_the_clip_box_are_whole_in_a_narrow_bar_too(qtbot, w
 @pytest.fixture
 def sliced(detected):
     """The profiles of stack 1 are shown."""
-    detected.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
+    detected.window.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Checked)
     return detected
 
 
 def test_that_the_slider_comes_with_a_stack_and_goes_with_it(sliced):
-    bar = sliced.panels.profiles
+    bar = sliced.window.panels.profiles
     assert bar.isVisible()
     assert bar.all.isChecked()
-    sliced.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Unchecked)
+    sliced.window.panels.stacks.list.topLevelItem(0).setCheckState(0, Qt.CheckState.Unchecked)
     assert not bar.isVisible()
 
 
 def test_that_slider_buttons_and_keys_go_from_profile_to_profile(sliced, qtbot):
-    bar, scene = sliced.panels.profiles, sliced.parts.scene
-    profiles = sliced.document.result.profiles
+    bar, scene = sliced.window.panels.profiles, sliced.window.views.scene
+    profiles = sliced.session.document.result.profiles
     indices = np.unique(profiles.profile_index[profiles.stack_id == 1])
-    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    qtbot.keyClick(sliced.window, Qt.Key.Key_Period)
     assert scene.state.view.shown_profile == indices[0]
-    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    qtbot.keyClick(sliced.window, Qt.Key.Key_Period)
     qtbot.mouseClick(bar.next, LEFT)
     assert scene.state.view.shown_profile == indices[2]
     assert bar.place.text() == f"3 of {len(indices)}"
-    qtbot.keyClick(sliced, Qt.Key.Key_Comma)
+    qtbot.keyClick(sliced.window, Qt.Key.Key_Comma)
     assert bar.slider.value() == 1
     bar.slider.setFocus()
     qtbot.keyClick(bar.slider, Qt.Key.Key_End)
     assert scene.state.view.shown_profile == indices[-1]
-    qtbot.keyClick(sliced, Qt.Key.Key_Period)
+    qtbot.keyClick(sliced.window, Qt.Key.Key_Period)
     assert scene.state.view.shown_profile == indices[-1]
     qtbot.mouseClick(bar.all, LEFT)
     assert scene.state.view.shown_profile is None
 
 
-def test_that_a_scan_is_seen_while_it_is_read(make_window, qtbot):
+def test_that_a_scan_is_seen_while_it_is_read(make_app, qtbot):
     go_on, cloud = threading.Event(), make_cloud()
     part = PointCloud(cloud.origin, cloud.xyz[:100])
 
     def read(path, settings, progress):
-        progress.look(part)
+        progress.show_part(part)
         assert go_on.wait(PATIENCE_S)
         return cloud
 
-    window = make_window(read=read)
-    window.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: window.parts.scene.glimpses == [part])
-    assert window.centre.currentWidget() is window.parts.scene
+    app = make_app(read=read)
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: app.window.views.scene.glimpses == [part])
+    assert app.window.centre.currentWidget() is app.window.views.scene
     go_on.set()
-    qtbot.waitUntil(lambda: window.document.scan is not None)
-    assert window.parts.scene.glimpses == [part, None]
+    qtbot.waitUntil(lambda: app.session.document.scan is not None)
+    assert app.window.views.scene.glimpses == [part, None]
 
 
-def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_window, qtbot):
+def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_app, qtbot):
     cloud = make_cloud()
 
     def read(path, settings, progress):
-        progress.look(cloud)
+        progress.show_part(cloud)
         while True:
             progress.update("reading", 0.1)
             time.sleep(0.01)
 
-    window = make_window(read=read)
-    window.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: len(window.parts.scene.glimpses) == 1)
-    window.jobs.cancel()
-    qtbot.waitUntil(lambda: window.centre.currentWidget() is window.panels.welcome)
-    assert window.parts.scene.glimpses[-1] is None
+    app = make_app(read=read)
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(lambda: len(app.window.views.scene.glimpses) == 1)
+    app.session.jobs.cancel()
+    qtbot.waitUntil(lambda: app.window.centre.currentWidget() is app.window.panels.welcome)
+    assert app.window.views.scene.glimpses[-1] is None

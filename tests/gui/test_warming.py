@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QSettings
 
-from pipegui.work.kernel_warmup import Warming, detect_demo
+from pipegui.work.kernel_warmup import KernelWarmup, detect_demo
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def command(path: Path, code: int = 0) -> list[str]:
 
 def test_that_kernels_are_compiled_once_and_not_again(qtbot, stored, tmp_path):
     for _ in range(2):
-        warming = Warming(stored, command(tmp_path / "ran"))
+        warming = KernelWarmup(stored, command(tmp_path / "ran"))
         told = []
         warming.started.connect(lambda told=told: told.append("started"))
         if not stored.allKeys():
@@ -40,7 +40,7 @@ def test_that_kernels_are_compiled_once_and_not_again(qtbot, stored, tmp_path):
 
 def test_that_a_warming_that_failed_is_tried_again(qtbot, stored, tmp_path):
     for _ in range(2):
-        warming = Warming(stored, command(tmp_path / "ran", code=1))
+        warming = KernelWarmup(stored, command(tmp_path / "ran", code=1))
         with qtbot.waitSignal(warming.ended):
             warming.start()
         warming.close()
@@ -48,7 +48,7 @@ def test_that_a_warming_that_failed_is_tried_again(qtbot, stored, tmp_path):
 
 
 def test_that_closing_the_window_ends_it(qtbot, stored):
-    warming = Warming(stored, [sys.executable, "-c", "import time; time.sleep(600)"])
+    warming = KernelWarmup(stored, [sys.executable, "-c", "import time; time.sleep(600)"])
     warming.start()
     qtbot.waitUntil(lambda: warming._process.processId() > 0)
     warming.close()
@@ -62,8 +62,8 @@ def test_that_the_command_is_one_that_detects(tmp_path):
     assert Path(words[4]).is_file()
 
 
-def test_that_the_window_says_what_it_does_at_the_first_run(window):
-    status = window.status
+def test_that_the_window_says_what_it_does_at_the_first_run(app):
+    status = app.window.status
     assert not status.warming.isVisible()
     status.start_warming()
     assert status.warming.isVisible()
@@ -75,7 +75,7 @@ def test_that_the_window_says_what_it_does_at_the_first_run(window):
 def test_that_the_window_is_there_before_what_only_a_detection_needs():
     heavy = ("matplotlib", "numba", "open3d", "scipy.spatial", "scipy.ndimage", "laspy")
     program = (
-        "import sys, pipegui.window.main_window, pipegui.scene.view, pipegui.plots.section_view\n"
+        "import sys, pipegui.composition, pipegui.scene.view, pipegui.plots.section_view\n"
         "import pipegui.plots.radius_plot, pipegui.plots.deviation_map\n"
         "import pipegui.plots.preview_view\n"
         f"print([name for name in {heavy} if name in sys.modules])"
