@@ -13,7 +13,11 @@ from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
 from pipegui.model.fingerprint import Fingerprint
 
 
-class ColourBy(StrEnum):
+class Choice(StrEnum):
+    """What the user chooses in the window: values are what is shown, files keep the names."""
+
+
+class ColourBy(Choice):
     """What the points' colour means."""
 
     SEGMENT = "Segment"
@@ -27,7 +31,7 @@ class ColourBy(StrEnum):
     VERDICT = "Verdict"
 
 
-class Background(StrEnum):
+class Background(Choice):
     """What lies behind the points."""
 
     SYSTEM = "System"
@@ -42,7 +46,7 @@ class Background(StrEnum):
         return cls.SYSTEM if value == "As the system" else None
 
 
-class Tool(StrEnum):
+class Tool(Choice):
     """What a click into the 3D view does."""
 
     SELECT = "Select"

@@ -1,8 +1,8 @@
-"""Frozen dataclasses to what JSON knows, and back by their type hints. Qt-free.
+"""Frozen dataclasses to what JSON knows, and back by their type hints.
 
-Written for files that live longer than a version of the program: fields that are not in
-the file keep their defaults, and those that the program does not know are left out.
-What does not fit its type is a `ValueError`: nothing is guessed.
+Files live longer than a version of the program. Fields that are not in the file keep their
+defaults, unknown fields are ignored, and classes are not named: where several are possible,
+a "kind" says which one is meant. A value that does not fit its type is a `ValueError`.
 """
 
 import dataclasses
@@ -17,8 +17,16 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from pipecore.errors import SettingsError
+from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.reasons import Reason
 from pipecore.settings import Settings
+from pipegui.model.document import Choice
+
+KIND_KEY = "kind"
+KIND_NAMES: dict[type, str] = {LineAxis: "line", ArcAxis: "arc"}
+"""How files name the dataclasses that stand where several are possible."""
+VERSION_1_NAMES = {"LineAxis": "line", "ArcAxis": "arc"}
+"""How files of version 1 name them under "type"."""
 
 
 def to_plain(value: Any) -> Any:  # noqa: PLR0911 - one for each type
@@ -27,11 +35,14 @@ def to_plain(value: Any) -> Any:  # noqa: PLR0911 - one for each type
         return value.to_dict()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-        return {"type": type(value).__name__} | fields
+        name = KIND_NAMES.get(type(value))
+        return fields if name is None else {KIND_KEY: name} | fields
     if isinstance(value, np.ndarray | np.generic):
         return to_plain(value.tolist())
     if isinstance(value, Reason) and value.values:
         return {"template": value.template, "values": to_plain(value.values)}
+    if isinstance(value, Choice):
+        return value.name.lower()
     if isinstance(value, StrEnum | Path):
         return str(value)
     if isinstance(value, float):
@@ -74,6 +85,8 @@ def from_plain(kind: Any, plain: Any) -> Any:  # noqa: PLR0911 - one for each ty
         return _from_fields(kind, plain)
     if isinstance(kind, type) and issubclass(kind, StrEnum):
         _expect(isinstance(plain, str), kind, plain)
+        if issubclass(kind, Choice) and plain.upper() in kind.__members__:
+            return kind[plain.upper()]
         return kind(plain)
     if kind is Reason:
         return _reason(plain)
@@ -92,9 +105,9 @@ def _from_union(kinds: tuple[Any, ...], plain: Any) -> Any:
     rest = [k for k in kinds if k is not type(None)]
     if len(rest) == 1:
         return from_plain(rest[0], plain)
-    # Dataclasses tell which one they are.
-    name = plain.get("type") if isinstance(plain, dict) else None
-    chosen = [k for k in rest if getattr(k, "__name__", "") == name]
+    _expect(isinstance(plain, dict), kinds, plain)
+    name = plain.get(KIND_KEY, VERSION_1_NAMES.get(plain.get("type")))
+    chosen = [kind for kind in rest if name is not None and KIND_NAMES.get(kind) == name]
     _expect(len(chosen) == 1, kinds, plain)
     return from_plain(chosen[0], plain)
 

@@ -1,11 +1,12 @@
-"""Project files: all of the user's work in one file, the clouds by reference. Qt-free.
+"""Project files: all of the user's work in one file, the clouds by reference.
 
 A project is a zip archive of ``project.json`` and NumPy arrays (``.npy``, never
-pickled): format version 1. ``project.json`` holds what is small, the arrays of scan `i`
+pickled): format version 2. ``project.json`` holds what is small, the arrays of scan `i`
 lie in ``scans/i``: ``segment_id``, ``element_id`` and ``deviation`` by point, and the
 columns of the profiles in ``profiles``. A cloud is named by its path, relative to the
 project where that can be, and known again by its fingerprint. Keys may be added within
-a version; a reader refuses a larger one.
+a version; a reader refuses a larger one. Version 1 named classes of the program, and
+choices of the view by the words shown.
 """
 
 import json
@@ -35,7 +36,7 @@ from pipegui.project.validation import check_result
 
 SUFFIX = ".pipegui"
 FORMAT = "pipegui project"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 CONTENTS = "project.json"
 POINT_ARRAYS = {"segment_id": np.int32, "element_id": np.int32, "deviation": np.float32}
 IN_PROFILES = {f.name for f in fields(Profiles)}

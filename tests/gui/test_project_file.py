@@ -112,7 +112,7 @@ def test_that_nothing_in_the_file_is_pickled_and_json_is_strict(document, tmp_pa
     with zipfile.ZipFile(path) as archive:
         assert archive.testzip() is None
         contents = json.loads(archive.read("project.json"), parse_constant=pytest.fail)
-        assert contents["format_version"] == 1
+        assert contents["format_version"] == 2
         for name in archive.namelist():
             if name.endswith(".npy"):
                 with archive.open(name) as file:
@@ -256,7 +256,7 @@ def rewritten(path: Path, change) -> Path:
 def test_that_a_newer_version_is_named_as_such(document, tmp_path):
     path = tmp_path / "work.pipegui"
     write_project(path, document)
-    newer = rewritten(path, lambda c: c.update(format_version=2, program="9.9"))
+    newer = rewritten(path, lambda c: c.update(format_version=3, program="9.9"))
     with pytest.raises(ProjectError, match=r"newer PipeGUI \(9\.9\)"):
         read_project(newer)
 
@@ -302,7 +302,7 @@ def test_that_a_view_that_makes_no_sense_does_not_cost_the_project(document, tmp
         lambda c: c["scans"][1]["result"]["elements"][0].update(radius=-1),
         lambda c: c["scans"][1]["result"]["elements"][0].update(element_id=2),
         lambda c: c["scans"][1]["result"]["elements"][0]["axis"].update(start=[1, 2]),
-        lambda c: c["scans"][1]["result"]["elements"][0]["axis"].update(type="Spiral"),
+        lambda c: c["scans"][1]["result"]["elements"][0]["axis"].update(kind="spiral"),
         lambda c: c["scans"][1]["result"]["elements"].pop(),
         lambda c: c["scans"][1]["result"].update(n_cloud_points=5),
         lambda c: c["scans"][1]["reviews"].update({"77": {}}),
@@ -374,4 +374,4 @@ def test_that_columns_of_profiles_are_all_kept(document, tmp_path):
     names = zipfile.ZipFile(path).namelist()
     for f in fields(Profiles):
         assert f"scans/1/profiles/{f.name}.npy" in names
-    assert project_file.FORMAT_VERSION == 1
+    assert project_file.FORMAT_VERSION == 2
