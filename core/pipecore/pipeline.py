@@ -1,26 +1,24 @@
 """The pipeline, in the paper's order, wherever the points are."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from pipecore.axes import join_centres
 from pipecore.deformation import relate_deformations
-from pipecore.elements import NearbyPoints, build_elements, find_pieces
-from pipecore.elements.sections import tabulate_ellipses
+from pipecore.elements import NearbyPoints, build_elements, propose_surfaces
 from pipecore.ellipses import Ellipses
-from pipecore.measurement import measure_elements
+from pipecore.measurement import MeasuringOptions, measure_elements, tabulate_ellipses
 from pipecore.progress import NoProgress, Progress
 from pipecore.rules import Rule, judge, load_rule
-from pipecore.segments import Overlay
+from pipecore.segments import StackOverlay
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
 from pipecore.types import Deformation, Element, PointCloud, Profiles, Result
-from pipecore.workspace import InMemory, Workspace, spread
+from pipecore.workspace import InMemory, Workspace, labels_to_full_cloud
 
 STAGES = {
     "thinning": 0.08,
@@ -46,7 +44,7 @@ def detect(
     cloud : PointCloud
     settings : Settings
     progress : Progress
-        Told the stages of `STAGES`.
+        Receives the stages of `STAGES`.
 
     Returns
     -------
@@ -63,50 +61,43 @@ def detect(
     return detect_in(InMemory(cloud), settings, progress)
 
 
-def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Result:
+def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> Result:
     """Find the elements of a workspace's cloud and their deformations; see `detect`."""
-    cloud = points.cloud
+    cloud, timer = workspace.cloud, StepTimer()
     rule = load_rule(settings.deformation.rule)
     if len(cloud) == 0:
-        return _nothing_found(cloud, settings)
-    seconds: dict[str, float] = {}
-    with _timed(seconds, "surface"):
-        surface = points.sample_surface(settings.thinning, progress)
-    with _timed(seconds, "stacks"):
-        stacks = choose_stacks(surface, settings.stacks, progress, points.local_axes)
-        overlay, found = Overlay(len(surface.xyz), points.allocate), []
-        uneven = points.leave_out_planes(surface, overlay.add_planes, settings, progress)
-    for stack, span in _shares(stacks):
-        # Stack by stack: the curves of all together need more memory than the cloud.
-        with _timed(seconds, "profiles"):
-            for curve_points, starts, own in points.cut(uneven, stack, settings, progress, span):
-                overlay.add(curve_points, starts)
-                found.append(own)
-    del uneven
-    with _timed(seconds, "segments"):
+        return _empty_result(cloud, settings)
+    with timer("surface"):
+        surface = workspace.sample_surface(settings.thinning, progress)
+    with timer("stacks"):
+        stacks = choose_stacks(surface, settings.stacks, progress, workspace.local_axes)
+        overlay, fits = StackOverlay(len(surface.xyz), workspace.allocate), []
+        max_radius = settings.elements.max_radius
+        for first, plane in workspace.remove_planes(surface, max_radius, progress):
+            overlay.add_planes(first, plane)
+    with timer("profiles"):
+        for points, starts, of_curves in workspace.cut_stacks(stacks, settings, progress):
+            overlay.add(points, starts)
+            fits.append(of_curves)
+    with timer("segments"):
         segments = overlay.number_segments(progress)
-        segment_id = spread(segments, surface.behind, points.allocate, progress)
-    with _timed(seconds, "ellipses"):
+        members = surface.full_resolution_points
+        segment_id = labels_to_full_cloud(segments, members, workspace.allocate, progress)
+    with timer("ellipses"):
         progress.update("ellipses", 0.0)
-        ellipses = Ellipses.concatenate(found)
-        found.clear()  # the same again
-    with _timed(seconds, "axes"):
+        ellipses = Ellipses.concatenate(fits)
+        fits.clear()
+    with timer("axes"):
         chains = join_centres(ellipses, progress)
-    with _timed(seconds, "elements"):
-        pieces = find_pieces(ellipses, chains, progress)
-        nearby = NearbyPoints(cloud, surface, progress, points.allocate)
-        built = build_elements(pieces, nearby, settings.elements, progress)
-        profiles = tabulate_ellipses(built.elements, ellipses)
-    with _timed(seconds, "deformations"):
+    with timer("elements"):
+        proposals = propose_surfaces(ellipses, chains, progress)
+        nearby = NearbyPoints(cloud, surface, progress, workspace.allocate)
+        elements = build_elements(proposals, nearby, settings.elements, progress)
+        profiles = tabulate_ellipses(elements, ellipses)
+    with timer("deformations"):
+        measuring = MeasuringOptions(stacks[0].width, settings.deformation, settings.ellipses.fit)
         measured = measure_elements(
-            built,
-            nearby,
-            len(cloud),
-            stacks[0].width,
-            settings.deformation,
-            settings.ellipses.fit,
-            progress,
-            allocate=points.allocate,
+            elements, nearby, len(cloud), measuring, progress, allocate=workspace.allocate
         )
         deformations = judge_deformations(measured.deformations, measured.elements, rule)
     return Result(
@@ -121,11 +112,11 @@ def detect_in(points: Workspace, settings: Settings, progress: Progress) -> Resu
         segment_id=segment_id,
         element_id=measured.element_id,
         deviation=measured.deviation,
-        seconds=seconds,
+        seconds=timer.seconds,
     )
 
 
-def _nothing_found(cloud: PointCloud, settings: Settings) -> Result:
+def _empty_result(cloud: PointCloud, settings: Settings) -> Result:
     """The result for a cloud without points."""
     return Result(
         settings=settings,
@@ -154,17 +145,22 @@ def judge_deformations(
     )
 
 
-Item = TypeVar("Item")
+class StepTimer:
+    """Sums up how long the steps of a detection take.
 
+    >>> timer = StepTimer()
+    >>> with timer("surface"):
+    ...     pass
+    >>> list(timer.seconds)
+    ['surface']
+    """
 
-def _shares(items: Sequence[Item]) -> Iterator[tuple[Item, tuple[float, float]]]:
-    """Each item with the part of its stage that it is."""
-    for i, item in enumerate(items):
-        yield item, (i / len(items), (i + 1) / len(items))
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
 
-
-@contextmanager
-def _timed(seconds: dict[str, float], step: str) -> Iterator[None]:
-    start = time.perf_counter()
-    yield
-    seconds[step] = seconds.get(step, 0.0) + time.perf_counter() - start
+    @contextmanager
+    def __call__(self, step: str) -> Iterator[None]:
+        """Time what is done within the context; several times add up."""
+        start = time.perf_counter()
+        yield
+        self.seconds[step] = self.seconds.get(step, 0.0) + time.perf_counter() - start

@@ -17,15 +17,15 @@ from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
 from pipecore.surface import (
+    NO_FULL_RESOLUTION_POINTS,
     NOISE_QUANTILE,
-    NOTHING_BEHIND,
     WIDEST_NEIGHBOURHOOD,
     Surface,
     fit_planes,
     median_spacing,
     sample_surface,
 )
-from pipecore.surface.thinning import SMALLEST_VOXEL, average_voxels
+from pipecore.surface.downsampling import SMALLEST_VOXEL, average_voxels
 from pipecore.types import PointCloud, Stack
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ class ProfilePreview:
     frame : ndarray, shape (3, 3)
         Rows e1, e2 (the plane's axes u and v) and d, as in `Curves`.
     uv : ndarray, shape (n, 2)
-        All thinned points of the profile, metres.
+        All downsampled points of the profile, metres.
     curve : ndarray of int, shape (n,)
         The curve that each belongs to, -1 for points of none.
     n_curves : int
@@ -174,12 +174,14 @@ def _surface_of_sample(
     is_all = len(index) == len(cloud)
     spacing = median_spacing(xyz, among=None if is_all else _is_well_inside(xyz))
     voxel = settings.thinning.voxel_mm / 1e3 or max(spacing, SMALLEST_VOXEL)
-    thinned = average_voxels(xyz, voxel, progress)
-    normals, residuals, distances = fit_planes(thinned.xyz, voxel, progress)
-    is_whole = np.full(len(normals), is_all) | _is_well_inside(thinned.xyz)
+    downsampled = average_voxels(xyz, voxel, progress)
+    normals, residuals, distances = fit_planes(downsampled.xyz, voxel, progress)
+    is_whole = np.full(len(normals), is_all) | _is_well_inside(downsampled.xyz)
     known = residuals[np.isfinite(residuals) & is_whole]
     noise = float(np.quantile(known, NOISE_QUANTILE)) if len(known) else np.nan
-    return Surface(thinned.xyz, normals, distances, thinned.behind, voxel, noise), is_whole
+    return Surface(
+        downsampled.xyz, normals, distances, downsampled.full_resolution_points, voxel, noise
+    ), is_whole
 
 
 def _is_well_inside(xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -231,7 +233,7 @@ def preview_profile(
             normals=whole.normals[inside],
             spacing=whole.spacing[inside],
         )
-    max_radius = settings.elements.max_radius_mm / 1e3
+    max_radius = settings.elements.max_radius
     curves = segment_profiles(surface, stack, settings.profiles, max_radius, progress)
     frame = curves.frame
     ellipses = fit_ellipses(curves, surface, settings.ellipses, settings.elements)
@@ -244,7 +246,7 @@ def preview_profile(
 
 def _empty_surface(plan: Plan) -> Surface:
     nowhere, none = np.empty((0, 3)), np.empty(0)
-    return Surface(nowhere, nowhere, none, NOTHING_BEHIND, plan.voxel, plan.noise)
+    return Surface(nowhere, nowhere, none, NO_FULL_RESOLUTION_POINTS, plan.voxel, plan.noise)
 
 
 def _slab(

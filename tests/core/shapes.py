@@ -104,12 +104,12 @@ def cloud_of(
 
 
 def sampled(*parts: tuple[Array, Array], voxel_mm: float = 0.0) -> Surface:
-    """Some surfaces as the detection sees them: thinned, with estimated normals."""
+    """Some surfaces as the detection sees them: downsampled, with estimated normals."""
     return sample_surface(cloud_of(*parts), ThinningSettings(voxel_mm), NoProgress())
 
 
 def known(*parts: tuple[Array, Array], spacing: float = 0.01, noise: float = 0.0) -> Surface:
-    """Some surfaces with their true normals, not thinned."""
+    """Some surfaces with their true normals, not downsampled."""
     xyz, normals = (np.concatenate(p) for p in zip(*parts, strict=True))
     n = len(xyz)
     behind = np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)
@@ -117,7 +117,7 @@ def known(*parts: tuple[Array, Array], spacing: float = 0.01, noise: float = 0.0
 
 
 def parents(behind: Order) -> NDArray[np.intp]:
-    """The thinned point of each point of a cloud."""
+    """The downsampled point of each point of a cloud."""
     members, starts = behind
     parent = np.full(len(members), -1)
     parent[members] = np.repeat(np.arange(len(starts) - 1), np.diff(starts))

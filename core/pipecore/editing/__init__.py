@@ -8,7 +8,6 @@ in a detection; the others keep their ids, names and measures.
 >>> result = merge_elements(cloud, result, [3, 5])
 """
 
-from pipecore.editing.again import detect_again, points_around, points_in_box
 from pipecore.editing.changes import (
     delete_elements,
     kinds_of,
@@ -16,6 +15,7 @@ from pipecore.editing.changes import (
     name_run,
     set_nominal_size,
 )
+from pipecore.editing.redetection import detect_again, points_around, points_in_box
 from pipecore.editing.reshaping import STAGES, change_kind, merge_elements, split_element
 
 __all__ = [

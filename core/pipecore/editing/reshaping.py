@@ -8,8 +8,8 @@ import numpy as np
 
 from pipecore.catalogues import nominal_size
 from pipecore.editing.changes import Labels, find, kinds_of, noted, on_elements
-from pipecore.editing.measuring import Shape, fit_shape, measure_anew, part_of
-from pipecore.elements.refinement.extent import SHOWN_GAP
+from pipecore.editing.refitting import RefittedElement, fit_shape, measure_anew, part_of
+from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII
 from pipecore.errors import EditError
 from pipecore.geometry import ArcAxis, Array, LineAxis
 from pipecore.progress import NoProgress, Progress
@@ -53,7 +53,9 @@ def merge_elements(
     first = parts[0]
     ends = sorted(_span_on(axis, part) for part in parts)
     between = tuple(
-        (a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > SHOWN_GAP * first.radius
+        (a[1], b[0])
+        for a, b in pairwise(ends)
+        if b[0] - a[1] > MIN_REPORTED_GAP_RADII * first.radius
     )
     n_points = [max(p.n_points, 1) for p in parts]
     radius = float(np.average([p.radius for p in parts], weights=n_points))
@@ -178,7 +180,7 @@ def _shape_on(
     progress: Progress,
     *,
     must_fit: bool = True,
-) -> Shape:
+) -> RefittedElement:
     """Fit an element to the points of its former owners between its ends."""
     index = np.flatnonzero(on_elements(result.element_id, owners))
     thinning = result.settings_of(min(owners)).thinning

@@ -46,7 +46,7 @@ CHAINS_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
+class Proposal:
     """A surface proposed for some ellipses.
 
     Parameters
@@ -85,7 +85,9 @@ class _Rows:
         )
 
 
-def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress) -> list[Piece]:
+def propose_surfaces(
+    ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
+) -> list[Proposal]:
     """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
 
     Parameters
@@ -101,7 +103,7 @@ def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
     )
     chains = np.split(order, np.flatnonzero(np.diff(chain[order])) + 1)
     chains = [members for members in chains if len(members) >= MIN_ELLIPSES]
-    found: list[list[Piece]] = [[] for _ in chains]
+    found: list[list[Proposal]] = [[] for _ in chains]
 
     def explain(first: int, last: int) -> None:
         for i in range(first, last):
@@ -111,7 +113,7 @@ def find_pieces(ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
     return [*find_spheres(ellipses), *(piece for pieces in found for piece in pieces)]
 
 
-def _explain_chain(ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
+def _explain_chain(ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
     pieces, members = _take_lines(rows, members, LONG_PIECE)
     tapered, members = _take_lines(rows, members, SHORT_PIECE, is_tapered=True)
     pieces += tapered
@@ -136,7 +138,7 @@ def _take_lines(
     members: NDArray[np.intp],
     min_length: float,
     is_tapered: bool = False,
-) -> tuple[list[Piece], NDArray[np.intp]]:
+) -> tuple[list[Proposal], NDArray[np.intp]]:
     """Take straight pieces of at least `min_length` radii off the members, best first.
 
     Returns them and the members that are left.
@@ -151,7 +153,7 @@ def _take_lines(
         min_length, MIN_ELLIPSES, number,
     )  # fmt: skip
     pieces = [
-        Piece(
+        Proposal(
             LineSurface(line[:3].copy(), line[3:6].copy(), line[6], line[7], is_tapered),
             members[number == k],
             line[8],
@@ -162,13 +164,13 @@ def _take_lines(
     return pieces, members[number < 0]
 
 
-def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
+def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
     """Take bends off the members, best first."""
     e = rows[members]
     free = np.ones(len(members), np.bool_)
     inliers = np.empty(len(members), np.bool_)
     arc = np.empty(8)
-    pieces: list[Piece] = []
+    pieces: list[Proposal] = []
     while free.sum() >= MIN_ELLIPSES:
         count = best_arc(
             e.centre, e.axis, e.radius, e.radius_sd, free, N_TRIALS,
@@ -191,7 +193,7 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Piece]:
         low, high, part = arc_extent(model, e.centre[chosen])
         if len(part) < MIN_ELLIPSES or high - low < np.deg2rad(12.0):
             continue
-        pieces.append(Piece(model, members[chosen[part]], low, high))
+        pieces.append(Proposal(model, members[chosen[part]], low, high))
     return pieces
 
 
@@ -226,7 +228,7 @@ def arc_extent(model: ArcSurface, points: Array) -> tuple[float, float, NDArray[
     return base + unrolled[part[0]], base + unrolled[part[-1]], order[part]
 
 
-def find_spheres(ellipses: Ellipses) -> list[Piece]:
+def find_spheres(ellipses: Ellipses) -> list[Proposal]:
     """Find spheres: ellipses whose normals meet in one point far from their planes.
 
     On a cylinder the normals of a section meet in its own plane; on a sphere those of
@@ -236,7 +238,7 @@ def find_spheres(ellipses: Ellipses) -> list[Piece]:
     offset = np.einsum("ij,ij->i", ellipses.centre - centres, ellipses.normal) / radii
     free = np.isfinite(radii)
     tree = cKDTree(np.where(free[:, None], centres, 1e9))
-    pieces: list[Piece] = []
+    pieces: list[Proposal] = []
     may_be = np.flatnonzero(free & (np.abs(offset) > 0.15))
     # Most have hardly a neighbour: counting them all at once is quick.
     n_near = tree.query_ball_point(centres[may_be], SAME_CENTRE * radii[may_be], return_length=True)
@@ -250,5 +252,5 @@ def find_spheres(ellipses: Ellipses) -> list[Piece]:
             continue
         model = SphereSurface(np.median(centres[near], axis=0), float(np.median(radii[near])))
         free[near] = False
-        pieces.append(Piece(model, near))
+        pieces.append(Proposal(model, near))
     return pieces

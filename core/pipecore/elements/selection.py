@@ -5,16 +5,17 @@ from numpy.typing import NDArray
 
 from pipecore.elements.fittings.bends import Corner, corner_between, find_corners, fit_bend
 from pipecore.elements.fittings.flanges import find_flanges
-from pipecore.elements.fittings.open_ends import follow_end
+from pipecore.elements.fittings.open_ends import extend_open_end
 from pipecore.elements.fittings.reducers import find_steps, fit_reducer
-from pipecore.elements.fittings.straight_ends import End, straight_ends
-from pipecore.elements.gates.acceptance import is_credible
+from pipecore.elements.fittings.straight_ends import straight_ends
+from pipecore.elements.gates.acceptance import passes_gates
 from pipecore.elements.gates.rounded_corners import is_rounded_corner
-from pipecore.elements.proposals import LONG_PIECE, Piece
+from pipecore.elements.proposals import LONG_PIECE, Proposal
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import Fitted, refine_piece
+from pipecore.elements.refinement.refine import FittedElement, refine_proposal
 from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface
-from pipecore.elements.speculative_refinement import refine_in_turn
+from pipecore.elements.runs.ends import End, Link
+from pipecore.elements.speculative_refinement import refine_speculatively
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
 
@@ -22,9 +23,9 @@ SHORT = 1.5
 """Straights of fewer radii wait for the bends: they may be part of one."""
 
 
-def refine_pieces(
-    pieces: list[Piece], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
-) -> tuple[list[Fitted], list[tuple[int, int]]]:
+def select_elements(
+    pieces: list[Proposal], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
+) -> tuple[list[FittedElement], list[Link]]:
     """Refine what was proposed, the surest first; drop what does not hold.
 
     Returns the fitted pieces, and pairs (fitting, straight) that belong together.
@@ -32,7 +33,7 @@ def refine_pieces(
     Spheres and long straights come first, then the fittings that these ask for, then
     the bends and short straights that the ellipses show on their own.
     """
-    keeper = _Keeper(nearby, settings)
+    keeper = Selector(nearby, settings)
     spheres, straights, rest = _by_support(pieces)
     keeper.try_pieces(spheres, progress, (0.3, 0.31))
     put_off = keeper.try_pieces(straights, progress, (0.31, 0.65), min_lengths=SHORT)
@@ -43,7 +44,7 @@ def refine_pieces(
         progress.update("elements", 0.67)
         keeper.try_bend(corner, bend_radius, ends)
     keeper.try_reducers()
-    keeper.follow_open_ends(progress)
+    keeper.extend_open_ends(progress)
     for ring in find_flanges(list(keeper.fitted), nearby, keeper.is_free):
         progress.update("elements", 0.7)
         keeper.keep(ring)
@@ -53,12 +54,12 @@ def refine_pieces(
     return keeper.result()
 
 
-def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece], list[Piece]]:
+def _by_support(pieces: list[Proposal]) -> tuple[list[Proposal], list[Proposal], list[Proposal]]:
     """Spheres, long straights and the rest, each with most ellipses first.
 
     Equal counts are told apart by place, not by the order in which they were found.
     """
-    groups: tuple[list[Piece], list[Piece], list[Piece]] = ([], [], [])
+    groups: tuple[list[Proposal], list[Proposal], list[Proposal]] = ([], [], [])
     for piece in sorted(
         pieces, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
     ):
@@ -72,55 +73,55 @@ def _by_support(pieces: list[Piece]) -> tuple[list[Piece], list[Piece], list[Pie
     return groups
 
 
-class _Keeper:
-    """Keeps the fitted pieces and which thinned points they have taken."""
+class Selector:
+    """Keeps the fitted pieces and which downsampled points they have taken."""
 
     def __init__(self, nearby: NearbyPoints, settings: ElementSettings) -> None:
-        self.fitted: list[Fitted] = []
+        self.fitted: list[FittedElement] = []
         self.is_free = np.ones(len(nearby.surface.xyz), np.bool_)
         self._nearby = nearby
         self._settings = settings
-        self.links: list[tuple[int, int]] = []
+        self.links: list[Link] = []
         self._joined: set[End] = set()
         self._replaced: set[int] = set()
 
     def try_pieces(
         self,
-        pieces: list[Piece],
+        pieces: list[Proposal],
         progress: Progress,
         span: tuple[float, float],
         min_lengths: float = 0.0,
-    ) -> list[Piece]:
+    ) -> list[Proposal]:
         """Refine pieces, several at once, and keep those that hold in their turn.
 
         Returns those that hold but are shorter than `min_lengths` radii; they are not kept.
         """
 
-        def refine(piece: Piece, used: list[NDArray[np.intp]]) -> Fitted | None:
+        def refine(piece: Proposal, used: list[NDArray[np.intp]]) -> FittedElement | None:
             return self._refine(piece, self.is_free, used)
 
         short = []
-        for piece, found in refine_in_turn(pieces, refine, self.is_free, progress, span):
+        for piece, found in refine_speculatively(pieces, refine, self.is_free, progress, span):
             if found is None:
                 continue
             if found.axis.length < min_lengths * found.fit.model.radius:
                 short.append(piece)
             else:
-                self._keep_if_it_holds(found)
+                self._accept_if_valid(found)
         return short
 
-    def try_piece(self, piece: Piece, between: tuple[End, ...] | None = None) -> None:
+    def try_piece(self, piece: Proposal, between: tuple[End, ...] | None = None) -> None:
         """Refine a piece and keep it if it holds; see `_usable` for `between`."""
         usable = self._usable(between)
         if usable is not None:
-            self._keep_if_it_holds(self._refine(piece, usable), between)
+            self._accept_if_valid(self._refine(piece, usable), between)
 
     def try_bend(self, corner: Corner, bend_radius: float, between: tuple[End, ...]) -> None:
         """Fit a bend at a corner and keep it if it holds."""
         usable = self._usable(between)
         if usable is not None:
             found = fit_bend(corner, bend_radius, self._nearby, usable)
-            self._keep_if_it_holds(found, between)
+            self._accept_if_valid(found, between)
 
     def try_reducers(self) -> None:
         """Fit reducers between straights on one line and keep those that hold.
@@ -135,14 +136,14 @@ class _Keeper:
             inner = [i for i, f in enumerate(self.fitted) if step.has_between(f)]
             inner = [i for i in inner if self._joined.isdisjoint({(i, 0), (i, 1)})]
             for i in inner:
-                usable[self.fitted[i].own] = True
+                usable[self.fitted[i].inliers] = True
             straights = self.fitted[between[0][0]], self.fitted[between[1][0]]
             found = fit_reducer(step, straights, self._nearby, usable)
-            if self._keep_if_it_holds(found, between):
+            if self._accept_if_valid(found, between):
                 self._joined |= {(i, end) for i in inner for end in (0, 1)}
                 self._replaced.update(inner)
 
-    def follow_open_ends(self, progress: Progress) -> None:
+    def extend_open_ends(self, progress: Progress) -> None:
         """Look for a bend, and the straight beyond it, where nothing joins a straight yet."""
         ends = straight_ends(self.fitted)
         while ends:
@@ -150,7 +151,7 @@ class _Keeper:
             end = ends.pop(0)
             if end.which in self._joined:
                 continue
-            followed = follow_end(end, self._nearby, self.is_free)
+            followed = extend_open_end(end, self._nearby, self.is_free)
             if followed is None:
                 continue
             bend, straight = followed
@@ -177,42 +178,42 @@ class _Keeper:
             return None
         usable = self.is_free.copy()
         for i, _ in between:
-            usable[self.fitted[i].own] = True
+            usable[self.fitted[i].inliers] = True
         return usable
 
     def _refine(
         self,
-        piece: Piece,
+        piece: Proposal,
         usable: NDArray[np.bool_],
         used: list[NDArray[np.intp]] | None = None,
-    ) -> Fitted | None:
-        return refine_piece(
+    ) -> FittedElement | None:
+        return refine_proposal(
             piece,
             self._nearby,
             usable,
-            lambda rough, slack: is_credible(rough, self._nearby.surface, self._settings, slack),
+            lambda rough, slack: passes_gates(rough, self._nearby.surface, self._settings, slack),
             used,
         )
 
-    def _keep_if_it_holds(
-        self, found: Fitted | None, between: tuple[End, ...] | None = None
+    def _accept_if_valid(
+        self, found: FittedElement | None, between: tuple[End, ...] | None = None
     ) -> bool:
-        if found is None or not is_credible(found, self._nearby.surface, self._settings):
+        if found is None or not passes_gates(found, self._nearby.surface, self._settings):
             return False
         if is_rounded_corner(found, self._nearby):
             return False
         self.keep(found, between)
         return True
 
-    def keep(self, found: Fitted, between: tuple[End, ...] | None = None) -> None:
+    def keep(self, found: FittedElement, between: tuple[End, ...] | None = None) -> None:
         """Keep what holds; its points are taken, and the ends that it joins."""
         if between is not None:
             self._joined.update(between)
             self.links += [(len(self.fitted), i) for i, _ in between]
-        self.is_free[found.own] = False
+        self.is_free[found.inliers] = False
         self.fitted.append(found)
 
-    def result(self) -> tuple[list[Fitted], list[tuple[int, int]]]:
+    def result(self) -> tuple[list[FittedElement], list[Link]]:
         """The pieces and links, without those that gave way to others."""
         left = [i for i in range(len(self.fitted)) if i not in self._replaced]
         number = {i: k for k, i in enumerate(left)}

@@ -1,4 +1,4 @@
-"""Refining pieces ahead of their turn, in threads, as if each had waited for the ones before."""
+"""Refining proposals ahead of their turn, in threads, with the result of one after the other."""
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
@@ -7,47 +7,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore import parallel
-from pipecore.elements.proposals import Piece
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.proposals import Proposal
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.progress import Progress
 
 Indices = NDArray[np.intp]
-Refined = tuple[Fitted | None, Indices]
+Refined = tuple[FittedElement | None, Indices]
 """What was found of a piece, and the points that had a say."""
 
-AHEAD = 8
+LOOKAHEAD_PER_THREAD = 8
 """So many pieces a thread are refined at once; more would lose their points to those before
 them."""
 
 
-def refine_in_turn(
-    pieces: Sequence[Piece],
-    refine: Callable[[Piece, list[Indices]], Fitted | None],
+def refine_speculatively(
+    pieces: Sequence[Proposal],
+    refine: Callable[[Proposal, list[Indices]], FittedElement | None],
     is_free: NDArray[np.bool_],
     progress: Progress,
     span: tuple[float, float],
-) -> Iterator[tuple[Piece, Fitted | None]]:
+) -> Iterator[tuple[Proposal, FittedElement | None]]:
     """Yield each piece with what `refine` finds of it when its turn comes.
 
     Whoever takes what is yielded takes its points from `is_free` before asking for the next.
-    Pieces are refined ahead of that, in threads; one that used points which have been taken
+    Proposals are refined ahead of that, in threads; one that used points which have been taken
     since is refined again. The result is that of one after the other.
 
     Parameters
     ----------
-    pieces : sequence of Piece
+    pieces : sequence of Proposal
     refine : callable
         Refines a piece with the points that are free now, and adds all points that it
         used to a list. It may look whether a point is free once each time it looks for
         points: some are taken while it works.
     is_free : ndarray of bool
-        Thinned points that no element has taken; changes between what is yielded.
+        Downsampled points that no element has taken; changes between what is yielded.
     progress : Progress
     span : (float, float)
         Which part of the stage these pieces are.
     """
 
-    def work(piece: Piece) -> Refined:
+    def work(piece: Proposal) -> Refined:
         used: list[Indices] = []
         found = refine(piece, used)
         return found, np.concatenate([*used, np.empty(0, np.intp)])
@@ -55,13 +55,13 @@ def refine_in_turn(
     def has_lost_points(refined: Future[Refined]) -> bool:
         return not is_free[refined.result()[1]].all()
 
-    n_ahead = AHEAD * parallel.threads()
-    ahead: list[Future[Refined]] = []
+    lookahead = LOOKAHEAD_PER_THREAD * parallel.threads()
+    queue: list[Future[Refined]] = []
     with parallel.pool() as pool:
         for turn, piece in enumerate(pieces):
             fraction = span[0] + (span[1] - span[0]) * turn / len(pieces)
-            ahead += [pool.submit(work, p) for p in pieces[turn + len(ahead) : turn + n_ahead]]
-            mine = ahead.pop(0)
+            queue += [pool.submit(work, p) for p in pieces[turn + len(queue) : turn + lookahead]]
+            mine = queue.pop(0)
             parallel.wait_for(mine, "elements", progress, fraction)
             if has_lost_points(mine):
                 mine = pool.submit(work, piece)
@@ -70,6 +70,6 @@ def refine_in_turn(
             yield piece, found
             if found is not None:
                 # Whatever has lost its points to it goes to work again at once.
-                for k, refined in enumerate(ahead):
+                for k, refined in enumerate(queue):
                     if refined.done() and has_lost_points(refined):
-                        ahead[k] = pool.submit(work, pieces[turn + 1 + k])
+                        queue[k] = pool.submit(work, pieces[turn + 1 + k])

@@ -1,21 +1,18 @@
 """Segments: connected components of all stacks laid over each other (paper, section 3.1)."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import components
 from pipecore.allocation import BLOCK, Allocate, in_memory
-from pipecore.profiles import Curves
 from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.types import NO_ID
 
 MIN_SEGMENT = 20
-"""Components of fewer thinned points are no segments."""
+"""Components of fewer downsampled points are no segments."""
 
 
-class Overlay:
+class StackOverlay:
     """Stacks laid over each other: points that share a curve in any stack are one component.
 
     Stacks are added one by one, so that no two need be held at a time.
@@ -71,29 +68,3 @@ class Overlay:
         for start, stop in in_chunks(n, BLOCK, "segments", progress):
             segments[start:stop] = sizes[self._parents[start:stop]]
         return segments
-
-
-def overlay_stacks(
-    curves: Sequence[Curves], n_points: int, progress: Progress
-) -> NDArray[np.int32]:
-    """Join the points that share a curve in any stack; number the components.
-
-    Parameters
-    ----------
-    curves : sequence of Curves
-        One per stack.
-    n_points : int
-        Number of points of the surface.
-    progress : Progress
-
-    Returns
-    -------
-    ndarray of int32, shape (n_points,)
-        As `Overlay.number_segments`.
-    """
-    overlay = Overlay(n_points)
-    for i, stack_curves in enumerate(curves):
-        progress.update("segments", i / len(curves))
-        overlay.add(stack_curves.points, stack_curves.starts)
-    progress.update("segments", 1.0)
-    return overlay.number_segments()

@@ -199,6 +199,11 @@ class ElementSettings:
         maximum=20.0,
     )
 
+    @property
+    def max_radius(self) -> float:
+        """Largest radius in metres."""
+        return self.max_radius_mm / 1e3
+
 
 @dataclass(frozen=True)
 class DeformationSettings:

@@ -1,4 +1,4 @@
-"""The scanned surface as detection sees it: thinned points with normals, spacing and noise."""
+"""The scanned surface as detection sees it: downsampled points with normals, spacing and noise."""
 
 from dataclasses import dataclass
 
@@ -9,19 +9,24 @@ from pipecore._kernels import neighbours
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
+from pipecore.surface.downsampling import (
+    SMALLEST_VOXEL,
+    DownsampledCloud,
+    average_voxels,
+    downsample,
+)
 from pipecore.surface.grid import cells_of
 from pipecore.surface.planes import planes_of_points
 from pipecore.surface.sorting import CellGrid, Order, index_type, take_points
 from pipecore.surface.spacing import median_spacing
-from pipecore.surface.thinning import SMALLEST_VOXEL, ThinnedCloud, average_voxels, thin
 from pipecore.types import PointCloud
 
 __all__ = [
-    "NOTHING_BEHIND",
+    "NO_FULL_RESOLUTION_POINTS",
     "SMALLEST_VOXEL",
+    "DownsampledCloud",
     "Order",
     "Surface",
-    "ThinnedCloud",
     "average_voxels",
     "cells_of",
     "estimate_normals",
@@ -42,13 +47,13 @@ NOISE_QUANTILE = 0.25
 
 MIN_NEIGHBOURS = 7
 
-NOTHING_BEHIND: Order = np.empty(0, np.int32), np.zeros(1, np.int32)
+NO_FULL_RESOLUTION_POINTS: Order = np.empty(0, np.int32), np.zeros(1, np.int32)
 """Of a surface whose points stand for none of a cloud's."""
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Thinned points with what their neighbourhoods tell.
+    """Downsampled points with what their neighbourhoods tell.
 
     Parameters
     ----------
@@ -56,19 +61,19 @@ class Surface:
         Local coordinates; unit normals of either sign, nan where there are too few neighbours.
     spacing : ndarray, shape (m,)
         Distance between neighbouring points around each point, metres.
-    behind : (ndarray of int, shape (n,), ndarray of int, shape (m + 1,))
+    full_resolution_points : (ndarray of int, shape (n,), ndarray of int, shape (m + 1,))
         The cloud's points in the order of their surface points, and where those of each
         begin.
     voxel : float
         Edge of the thinning's voxels, metres.
     noise : float
-        Typical distance of the thinned points from their surface, metres.
+        Typical distance of the downsampled points from their surface, metres.
     """
 
     xyz: NDArray[np.float64]
     normals: NDArray[np.float64]
     spacing: NDArray[np.float64]
-    behind: Order
+    full_resolution_points: Order
     voxel: float
     noise: float
 
@@ -83,7 +88,7 @@ class Surface:
             self.xyz[rows],
             self.normals[rows],
             self.spacing[rows],
-            NOTHING_BEHIND,
+            NO_FULL_RESOLUTION_POINTS,
             self.voxel,
             self.noise,
         )
@@ -92,7 +97,7 @@ class Surface:
 def fit_planes(
     points: NDArray[np.float64], voxel: float, progress: Progress = NoProgress()
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Fit a plane to the neighbourhood of every thinned point.
+    """Fit a plane to the neighbourhood of every downsampled point.
 
     The neighbourhood reaches at most `WIDEST_NEIGHBOURHOOD` voxels; what lies beyond does
     not change a bit of the result.
@@ -120,14 +125,21 @@ def fit_planes(
     return normals, residuals, spacing
 
 
-def estimate_normals(thinned: ThinnedCloud, progress: Progress) -> Surface:
-    """Give thinned points the normals, spacing and noise of their neighbourhoods."""
-    normals, residuals, spacing = fit_planes(thinned.xyz, thinned.voxel, progress)
+def estimate_normals(downsampled: DownsampledCloud, progress: Progress) -> Surface:
+    """Give downsampled points the normals, spacing and noise of their neighbourhoods."""
+    normals, residuals, spacing = fit_planes(downsampled.xyz, downsampled.voxel, progress)
     known = np.isfinite(residuals).any()
     noise = float(np.nanquantile(residuals, NOISE_QUANTILE)) if known else np.nan
-    return Surface(thinned.xyz, normals, spacing, thinned.behind, thinned.voxel, noise)
+    return Surface(
+        downsampled.xyz,
+        normals,
+        spacing,
+        downsampled.full_resolution_points,
+        downsampled.voxel,
+        noise,
+    )
 
 
 def sample_surface(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> Surface:
-    """Thin `cloud` and estimate the normals of the thinned points."""
-    return estimate_normals(thin(cloud, settings, progress), progress)
+    """Thin `cloud` and estimate the normals of the downsampled points."""
+    return estimate_normals(downsample(cloud, settings, progress), progress)

@@ -6,7 +6,7 @@
 
 Every step is cut where its result does not change: voxels into slabs of whole planes,
 normals into the same slabs with a margin, profiles into batches of whole profiles. What
-crosses the borders, segments and axes, is joined by the thinned points that both sides share
+crosses the borders, segments and axes, is joined by the downsampled points that both sides share
 and by the ellipses of all tiles together.
 """
 

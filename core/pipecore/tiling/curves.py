@@ -1,7 +1,7 @@
 """Stacks in files: directions from samples of all slabs, profiles batch by batch.
 
 A curve lies in one profile, so a batch of whole profiles needs no margin, and its curves are
-those of the whole cloud. What joins batches and stacks are the thinned points that their
+those of the whole cloud. What joins batches and stacks are the downsampled points that their
 curves share.
 """
 
@@ -19,18 +19,18 @@ from pipecore.profiles import MAX_SLOPE
 from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
-from pipecore.surface import NOTHING_BEHIND, Surface
+from pipecore.surface import NO_FULL_RESOLUTION_POINTS, Surface
 from pipecore.surface.planes import CellSums, find_planes, sum_cells
 from pipecore.tiling.engine import Engine
+from pipecore.tiling.slabs import Rows, TiledSurface
 from pipecore.tiling.store import StopWhenUnwanted, Store
-from pipecore.tiling.thinning import Rows, TiledSurface
 from pipecore.types import Stack
-from pipecore.workspace import Cut, JoinPlanes, cut_and_fit
+from pipecore.workspace import Cut, PlaneLabels, cut_and_fit
 
 Array = NDArray[np.float64]
 
 BYTES_PER_POINT = 420
-"""What cutting a thinned point into a profile and fitting its curve takes at the most."""
+"""What cutting a downsampled point into a profile and fitting its curve takes at the most."""
 SORTING = 0.3
 """Share of the time that sorting points by profile takes."""
 CUT_ARRAYS = "surface", "normals", "spacing"
@@ -59,10 +59,10 @@ def local_axes_in_slabs(engine: Engine, tiled: TiledSurface, progress: Progress)
     return np.concatenate(engine.run(axes_of_slab, tiles, "directions", progress))
 
 
-def leave_out_planes(
-    engine: Engine, tiled: TiledSurface, join: JoinPlanes, max_radius: float, progress: Progress
-) -> None:
-    """Find the planes and tell them; write for each slab which of its points are cut."""
+def remove_planes(
+    engine: Engine, tiled: TiledSurface, max_radius: float, progress: Progress
+) -> Iterator[PlaneLabels]:
+    """Yield the planes of each slab's points; write for each slab which of its points are cut."""
     store, voxel = engine.store, tiled.surface.voxel
     tiles = [(k, slab.surface, voxel) for k, slab in enumerate(tiled.slabs)]
     parts = engine.run(sum_slab_cells, tiles, "directions", progress, (0.8, 1.0))
@@ -70,7 +70,7 @@ def leave_out_planes(
     for k, (slab, cells) in enumerate(zip(tiled.slabs, known, strict=True)):
         progress.update("directions", 1.0)
         ids = store.open(f"cells-{k}")
-        join(slab.surface[0], cells.plane[ids])
+        yield PlaneLabels(slab.surface[0], cells.plane[ids])
         rows = slab.surface[0] + np.flatnonzero(cells.is_cut[ids])
         store.save(f"cut-{k}", rows.astype(np.int32))
         # Every stack looks at these points, so that they are laid side by side.
@@ -108,7 +108,7 @@ def cut_in_batches(
     tables = engine.run(ellipses_of_batch, batches, "profiles", progress, (middle, end))
     store.remove(*(f"sorted-{k}" for k in range(len(slabs))))
     for k, table in enumerate(tables):
-        yield store.open(f"points-{k}"), store.open(f"curves-{k}"), table
+        yield Cut(store.open(f"points-{k}"), store.open(f"curves-{k}"), table)
         store.remove(f"points-{k}", f"curves-{k}")
 
 
@@ -192,9 +192,9 @@ def ellipses_of_batch(
 
     index = of_all("cut")
     xyz, normals, spacing = (of_all(f"cut-{name}") for name in CUT_ARRAYS)
-    surface = Surface(xyz, normals, spacing, NOTHING_BEHIND, facts.voxel, facts.noise)
+    surface = Surface(xyz, normals, spacing, NO_FULL_RESOLUTION_POINTS, facts.voxel, facts.noise)
     cuts = cut_and_fit(surface, stack, settings, StopWhenUnwanted(store))
-    store.save(f"points-{number}", index[np.concatenate([points for points, _, _ in cuts])])
-    sizes = [np.diff(starts) for _, starts, _ in cuts]
+    store.save(f"points-{number}", index[np.concatenate([cut.points for cut in cuts])])
+    sizes = [np.diff(cut.starts) for cut in cuts]
     store.save(f"curves-{number}", np.cumsum(np.concatenate([np.zeros(1, np.int64), *sizes])))
-    return Ellipses.concatenate([own for _, _, own in cuts])
+    return Ellipses.concatenate([cut.ellipses for cut in cuts])

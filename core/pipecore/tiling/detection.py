@@ -9,12 +9,12 @@ from pipecore.pipeline import detect_in
 from pipecore.progress import NoProgress, Progress
 from pipecore.rules import load_rule
 from pipecore.settings import Settings
-from pipecore.tiling import curves, thinning
+from pipecore.tiling import curves, slabs
 from pipecore.tiling.engine import start_engine
 from pipecore.tiling.memory import GIB, SHARE_OF_FREE, free_memory, keeping_within, tile_bytes
-from pipecore.tiling.reading import read_into_store
+from pipecore.tiling.parallel_reading import read_into_store
 from pipecore.tiling.store import temporary_store
-from pipecore.tiling.workspace import InTiles
+from pipecore.tiling.tiled_workspace import InTiles
 from pipecore.types import PointCloud, Result
 
 
@@ -74,4 +74,4 @@ def _sizes(settings: Settings, room: int) -> tuple[int, int]:
     points = int(settings.tiling.tile_mpoints * 1e6)
     if not points:
         return room, room
-    return points * thinning.BYTES_PER_POINT, points * curves.BYTES_PER_POINT
+    return points * slabs.BYTES_PER_POINT, points * curves.BYTES_PER_POINT

@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore.elements.refinement.extent import find_extent, section_misfit, turning_by_row
-from pipecore.elements.runs import (
-    Lines,
-    Span,
-    meeting_ends,
-    number_runs,
-    trim_to_reducer,
-    trim_to_tangent,
-)
+from pipecore._kernels.extent import turn_of_normals
+from pipecore.elements.refinement.extent import find_extent, section_misfit
+from pipecore.elements.runs.ends import AxisSpan, LineIndex, meeting_ends
+from pipecore.elements.runs.numbering import number_runs
+from pipecore.elements.runs.trimming import trim_to_reducer, trim_to_tangent
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
 
@@ -129,7 +125,9 @@ def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
     for points, turning in ((wall_points(rng, 0, 1), 1.0), (floor_points(rng, 0, 1), 0.0)):
         _, clock, _, lean = points
         row = rng.integers(0, 2, len(clock))
-        assert_allclose(turning_by_row(clock, lean, row, 3), [turning, turning, 0.0], atol=0.1)
+        found = np.empty(3)
+        turn_of_normals(clock, lean, row, found)
+        assert_allclose(found, [turning, turning, 0.0], atol=0.1)
 
 
 def test_that_a_surface_without_points_has_no_extent(rng):
@@ -175,7 +173,7 @@ def chain(rng):
 def test_that_a_straight_a_bend_and_a_straight_meet_at_their_ends(rng, is_turned):
     into, bend, out = chain(rng)
     axes = [into, bend.reversed() if is_turned else bend, out]
-    found = meeting_ends([Span(a, (RADIUS, RADIUS)) for a in axes])
+    found = meeting_ends([AxisSpan(a, (RADIUS, RADIUS)) for a in axes])
     expected = {(0, 1, 1, int(is_turned)), (1, 1 - is_turned, 2, 0)}
     assert {min(f, (*f[2:], *f[:2])) for f in found} == expected
     assert_array_equal(number_runs(3, [(i, j) for i, _, j, _ in found]), [0, 0, 0])
@@ -188,17 +186,17 @@ def test_that_ends_beside_each_other_do_not_meet(rng):
     beside = LineAxis(one.at(1.1) + 2.2 * RADIUS * up, d, 1.0)
     across = LineAxis(one.end, np.array(up), 1.0)
     thick = LineAxis(one.at(1.1), d, 1.0)
-    spans = [Span(one, (RADIUS, RADIUS))]
-    assert meeting_ends([*spans, Span(beside, (RADIUS, RADIUS))]) == []
-    assert meeting_ends([*spans, Span(across, (RADIUS, RADIUS))]) == []
-    assert meeting_ends([*spans, Span(thick, (3 * RADIUS, 3 * RADIUS))]) == []
+    spans = [AxisSpan(one, (RADIUS, RADIUS))]
+    assert meeting_ends([*spans, AxisSpan(beside, (RADIUS, RADIUS))]) == []
+    assert meeting_ends([*spans, AxisSpan(across, (RADIUS, RADIUS))]) == []
+    assert meeting_ends([*spans, AxisSpan(thick, (3 * RADIUS, 3 * RADIUS))]) == []
     assert_array_equal(number_runs(3, []), [0, 1, 2])
 
 
 def test_that_an_end_meets_only_the_nearest(rng):
     d = random_direction(rng)
     one, near, far = (LineAxis(s * d, d, 0.3) for s in (0.0, 0.35, 0.7))
-    found = meeting_ends([Span(a, (RADIUS, RADIUS)) for a in (one, near, far)])
+    found = meeting_ends([AxisSpan(a, (RADIUS, RADIUS)) for a in (one, near, far)])
     assert {frozenset((i, j)) for i, _, j, _ in found} == {frozenset((0, 1)), frozenset((1, 2))}
 
 
@@ -236,7 +234,7 @@ def test_that_nothing_is_trimmed_where_the_tangent_point_is_out_of_reach(rng):
 def test_that_lines_near_a_place_are_those_that_pass_it(rng):
     axes = [LineAxis(rng.uniform(-1, 1, 3), random_direction(rng), 0.8) for _ in range(40)]
     axes[7] = ArcAxis(np.zeros(3), np.eye(3)[2], np.eye(3)[0], 0.3, 1.0)
-    lines, reach = Lines(axes), rng.uniform(0.1, 0.6, 40)
+    lines, reach = LineIndex(axes), rng.uniform(0.1, 0.6, 40)
     n_found = 0
     for place in rng.uniform(-1, 1, (20, 3)):
         expected = []
@@ -248,7 +246,7 @@ def test_that_lines_near_a_place_are_those_that_pass_it(rng):
         assert lines.near(place, reach) == expected
         n_found += len(expected)
     assert n_found > 20
-    assert Lines([]).near(np.zeros(3), np.empty(0)) == []
+    assert LineIndex([]).near(np.zeros(3), np.empty(0)) == []
 
 
 @pytest.mark.parametrize("at_start", [False, True])

@@ -5,15 +5,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipecore.elements.fittings.bends import Corner, fit_bend, pipe_residuals
-from pipecore.elements.fittings.flanges import find_flanges, flanges, longest_run
-from pipecore.elements.fittings.open_ends import follow_end
+from pipecore.elements.fittings.flanges import find_flanges, longest_run, pair_flanges
+from pipecore.elements.fittings.open_ends import extend_open_end
 from pipecore.elements.fittings.straight_ends import StraightEnd
 from pipecore.elements.fittings.tees import cut_tees, find_junctions, tee_ends
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
-from pipecore.elements.runs import Span
+from pipecore.elements.runs.ends import AxisSpan
 from pipecore.geometry import ArcAxis, LineAxis, unit
 from tests.core.shapes import cloud_of, jittered, plane, random_rotation, sampled, tube
 
@@ -25,7 +25,7 @@ def straight(axis, radius, n_own=0):
     """A straight that is known well, as the refinement leaves it."""
     model = LineSurface(axis.at(axis.length / 2), axis.direction, radius)
     fit = SurfaceFit(model, np.eye(5) * 1e-8, NOISE, 1000)
-    return Fitted(fit, axis, np.arange(n_own), Extent(0, axis.length, np.pi, 1.0, ()), 0.0)
+    return FittedElement(fit, axis, np.arange(n_own), Extent(0, axis.length, np.pi, 1.0, ()), 0.0)
 
 
 def scanned(*parts):
@@ -60,7 +60,7 @@ def rings_of(pipe, *parts):
     nearby, is_free = scanned(*parts)
     found = []
     for ring in find_flanges([pipe], nearby, is_free):
-        is_free[ring.own] = False
+        is_free[ring.inliers] = False
         found.append(ring)
     return found
 
@@ -84,7 +84,7 @@ def test_that_a_flange_on_a_pipe_or_at_its_end_is_found_by_its_rim(
     chainage, rho, _ = disc.pipe_coordinates(np.stack([ring.axis.start, ring.axis.end]))
     assert_allclose(sorted(chainage), [0.0, 0.045], atol=0.008)
     assert_allclose(rho, 0.0, atol=0.001)
-    assert flanges([straight(pipe, radius), ring]) == [(1, 0)]
+    assert pair_flanges([straight(pipe, radius), ring]) == [(1, 0)]
 
 
 def test_that_a_wider_pipe_and_a_wall_beside_a_pipe_are_no_flanges(rng, frame):
@@ -107,7 +107,7 @@ def test_that_the_longest_run_of_sectors_goes_round_and_closes_single_gaps():
 
 
 def spans_of(*pipes):
-    return [Span(axis, (radius, radius)) for axis, radius in pipes]
+    return [AxisSpan(axis, (radius, radius)) for axis, radius in pipes]
 
 
 @pytest.mark.parametrize("lean_deg", [90.0, 45.0])
@@ -181,10 +181,10 @@ def test_that_the_parts_of_a_cut_run_are_the_run(rng, frame):
     assert_allclose(first.axis.end, tee.axis.start, atol=1e-12)
     assert_allclose(tee.axis.end, last.axis.start, atol=1e-12)
     assert_allclose(last.axis.end, run.end, atol=1e-12)
-    own = np.concatenate([p.found.own for p in parts[:3]])
+    own = np.concatenate([p.found.inliers for p in parts[:3]])
     assert sorted(own) == list(range(500))
     for part in (tee, first, last):
-        chainage, _, _ = part.axis.pipe_coordinates(xyz[part.found.own])
+        chainage, _, _ = part.axis.pipe_coordinates(xyz[part.found.inliers])
         assert chainage.min() > -0.011
         assert chainage.max() < part.axis.length + 0.011
 
@@ -269,7 +269,7 @@ def follows_as_built(rng, turn_deg):
     # The straight itself has been found already.
     ahead = (nearby.surface.xyz - axis.start) @ corner.towards[0]
     end = StraightEnd((0, 1), axis.start, corner.towards[0], radius)
-    bend, beyond = follow_end(end, nearby, free & (ahead > 0))
+    bend, beyond = extend_open_end(end, nearby, free & (ahead > 0))
     assert bend.model.radius == pytest.approx(radius)
     near = np.cos(np.deg2rad(12))
     return (
@@ -294,4 +294,4 @@ def test_that_nothing_follows_an_end_at_a_wall_or_in_the_air(rng, frame):
     for parts in ([own], [own, wall]):
         nearby, free = scanned(*parts)
         is_ahead = (nearby.surface.xyz - pipe.end) @ along > -0.005
-        assert follow_end(end, nearby, free & is_ahead) is None
+        assert extend_open_end(end, nearby, free & is_ahead) is None

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from pipecore.elements.fittings.reducers import Step, find_steps, fit_reducer
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.geometry import LineAxis, surface_points, unit
 from pipecore.pipeline import detect
@@ -24,7 +24,7 @@ def straight(axis, radius):
     """A straight that is known well, as the refinement leaves it."""
     model = LineSurface(axis.at(axis.length / 2), axis.direction, radius)
     fit = SurfaceFit(model, np.eye(5) * 1e-8, NOISE, 1000)
-    return Fitted(fit, axis, np.arange(0), Extent(0, axis.length, np.pi, 1.0, ()), 0.0)
+    return FittedElement(fit, axis, np.arange(0), Extent(0, axis.length, np.pi, 1.0, ()), 0.0)
 
 
 def cone(rng, axis, radii, arc):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from pipecore.elements.sections import cut_normal_stack
 from pipecore.inspection.points import ElementPoints, element_points, profile_points
+from pipecore.measurement.sections import cut_normal_stack
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()

@@ -156,14 +156,14 @@ def test_that_pipe_coordinates_are_those_of_the_axis(rng):
 
 
 def cloud_around(rng, axis, n=400):
-    """A cloud with two points behind each thinned one, in random order."""
-    thinned = axis.at(rng.uniform(-0.5, axis.length + 0.5, n)) + 0.1 * rng.normal(size=(n, 3))
+    """A cloud with two points behind each downsampled one, in random order."""
+    downsampled = axis.at(rng.uniform(-0.5, axis.length + 0.5, n)) + 0.1 * rng.normal(size=(n, 3))
     parent = rng.permutation(np.repeat(np.arange(n), 2)).astype(np.int32)
-    xyz = thinned[parent] + 0.002 * rng.normal(size=(2 * n, 3))
+    xyz = downsampled[parent] + 0.002 * rng.normal(size=(2 * n, 3))
     normals = unit_rows(rng.normal(size=(n, 3)))
     normals[:5] = np.nan
     behind = group_by_label(parent, n)
-    surface_of_cloud = Surface(thinned, normals, np.full(n, 0.01), behind, 0.01, 0.001)
+    surface_of_cloud = Surface(downsampled, normals, np.full(n, 0.01), behind, 0.01, 0.001)
     return NearbyPoints(PointCloud(np.zeros(3), xyz), surface_of_cloud), xyz, parent
 
 
@@ -176,7 +176,7 @@ def test_that_all_points_around_an_axis_are_found(rng, which):
         there = (rho > 0.4 * radius) & (rho < 1.3 * radius)
         there &= (chainage > -margin) & (chainage < axis.length + margin)
         assert there.any()
-        assert_array_equal(points.thinned(axis, radius, margin), np.flatnonzero(there))
+        assert_array_equal(points.around_axis(axis, radius, margin), np.flatnonzero(there))
     centre = axis.at(0.2)
     near = np.linalg.norm(points.surface.xyz - centre, axis=1) < 0.15
     assert_array_equal(points.within_ball(centre, 0.15), np.flatnonzero(near))
@@ -192,7 +192,7 @@ def test_that_points_on_a_surface_are_told_from_those_inside(rng, which):
     points, _, _ = cloud_around(rng, axis)
     is_free = rng.random(len(points.surface.xyz)) < 0.7
     found = points.on_surface(model, axis, margin, is_free, band=0.03, depth=0.02, min_cos=0.5)
-    near = points.thinned(axis, radius, margin)
+    near = points.around_axis(axis, radius, margin)
     xyz, normals = points.surface.xyz[near], points.surface.normals[near]
     residual, _, outward = model.residuals(xyz)
     chainage, _, clock = axis.pipe_coordinates(xyz)
@@ -200,7 +200,7 @@ def test_that_points_on_a_surface_are_told_from_those_inside(rng, which):
     like = np.abs(cosine) > 0.5
     on = like & (np.abs(residual) < 0.03) & is_free[near]
     assert 3 < on.sum() < like.sum()
-    assert_array_equal(found.own, near[on])
+    assert_array_equal(found.inliers, near[on])
     assert_allclose(found.residual, residual[on], atol=1e-12)
     assert_allclose(found.chainage, chainage[on], atol=1e-12)
     assert_allclose(found.clock, clock[on], atol=1e-12)
@@ -228,7 +228,7 @@ def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch,
             LineSurface(axis.at(0.5), axis.direction, 0.15), axis, 0.0, is_free,
             band=0.1, depth=0.1, min_cos=0.0, is_rough=is_rough,
         )  # fmt: skip
-        return near.own, near.spacing
+        return near.inliers, near.spacing
 
     every, spacing = found(is_rough=False)
     assert_array_equal(found(is_rough=True)[0], every)
@@ -244,7 +244,7 @@ def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch,
 def test_that_points_behind_thinned_ones_are_in_the_order_of_their_places(rng):
     points, xyz, parent = cloud_around(rng, axes_of(rng)[0], n=50)
     chosen = np.array([3, 7, 20])
-    index, places, normals = points.of_cloud(chosen)
+    index, places, normals = points.full_resolution_with_normals(chosen)
     assert_array_equal(parent[index], np.repeat(chosen, 2))
     assert_array_equal(places, xyz[index])
     assert (places[::2, 0] < places[1::2, 0]).all()

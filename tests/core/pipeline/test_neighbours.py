@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipecore.geometry import ArcAxis, LineAxis
-from pipecore.measurement import bounding_boxes, neighbours_of
+from pipecore.measurement.adjacency import bounding_boxes, neighbours_of
 from pipecore.types import Element, ElementKind
 from tests.core.shapes import random_direction, random_rotation
 

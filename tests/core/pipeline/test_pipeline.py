@@ -114,7 +114,7 @@ def test_that_elements_are_where_they_were_built_in_world_coordinates(simulated,
     start = built.start + simulated.truth.origin
     assert np.hypot(*result.origin[:2]) > 1e6
     ends = [end + result.origin for e in result.elements for end in (e.axis.start, e.axis.end)]
-    # The scan shows the pipe's end to within its spacing and a thinned point.
+    # The scan shows the pipe's end to within its spacing and a downsampled point.
     assert np.linalg.norm(np.array(ends) - start, axis=1).min() < 0.03
 
 

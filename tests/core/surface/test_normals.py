@@ -25,7 +25,7 @@ R = 0.15
 
 
 def inner(surface: Surface, mask):
-    """Normals and places of the thinned points for which `mask` holds."""
+    """Normals and places of the downsampled points for which `mask` holds."""
     return surface.xyz[mask], surface.normals[mask]
 
 
@@ -66,7 +66,12 @@ def test_that_normals_of_curved_surfaces_are_radial(rng, shape):
             surface = sampled(tube(rng, axis, R, spacing=0.005, noise=noise), voxel_mm=10)
             chainage = axis.pipe_coordinates(surface.xyz)[0]
             surface = Surface(
-                surface.xyz, surface.normals, surface.spacing, surface.behind, 0.01, surface.noise
+                surface.xyz,
+                surface.normals,
+                surface.spacing,
+                surface.full_resolution_points,
+                0.01,
+                surface.noise,
             )
             true = unit_rows(surface.xyz - axis.at(chainage))
         error = angle_between(surface.normals, true)
@@ -93,7 +98,7 @@ def test_that_lonely_points_have_no_normal(rng):
         [plane(rng, np.zeros(3), [0.3, 0, 0], [0, 0.3, 0])[0], [[2.0, 2.0, 2.0], [-2.0, 1.0, 0.5]]]
     )
     surface = sample_surface(PointCloud(np.zeros(3), xyz), ThinningSettings(), NoProgress())
-    lonely = parents(surface.behind)[-2:]
+    lonely = parents(surface.full_resolution_points)[-2:]
     assert np.isnan(surface.normals[lonely]).all()
     assert np.isfinite(np.delete(surface.normals, lonely, axis=0)).mean() > 0.99
 
@@ -104,7 +109,7 @@ def test_that_turning_the_cloud_turns_its_normals(rng):
     q = random_rotation(rng)
     surface = sampled((xyz, xyz), voxel_mm=10)
     turned = sampled((xyz @ q.T, xyz), voxel_mm=10)
-    # The cubes differ, so places are compared: the normal of the nearest thinned point.
+    # The cubes differ, so places are compared: the normal of the nearest downsampled point.
     _, nearest = cKDTree(turned.xyz @ q).query(surface.xyz)
     angle = angle_between(turned.normals[nearest] @ q, surface.normals)
     assert np.median(angle) < np.radians(4.0)

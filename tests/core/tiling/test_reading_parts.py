@@ -18,7 +18,7 @@ from pipecore.io.formats import las
 from pipecore.progress import NoProgress
 from pipecore.settings import LengthUnit
 from pipecore.tiling.engine import start_engine
-from pipecore.tiling.reading import read_into_store
+from pipecore.tiling.parallel_reading import read_into_store
 from pipecore.tiling.store import temporary_store
 from pipecore.types import PointCloud
 from tests.core.io.writers import make_points, write_las

@@ -15,7 +15,7 @@ from pipecore.report import result_to_dict
 from pipecore.settings import Settings
 from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Elbow, Run, Straight
-from pipecore.tiling import detect_in_tiles, thinning
+from pipecore.tiling import detect_in_tiles, slabs
 from pipecore.types import PointCloud
 
 TILES = {"tiling.memory_gib": 0.5, "tiling.tile_mpoints": 0.01}
@@ -65,7 +65,7 @@ def assert_same(found, expected):
 
 
 def test_that_tiles_find_the_same_as_the_whole(scanned, whole, monkeypatch):
-    monkeypatch.setattr(thinning, "PART", 7_000)
+    monkeypatch.setattr(slabs, "PART", 7_000)
     cloud, expected = whole
     assert len(expected.elements) >= 4
     settings = Settings().replace(TILES)

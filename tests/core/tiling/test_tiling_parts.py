@@ -21,8 +21,8 @@ from pipecore.surface import WIDEST_NEIGHBOURHOOD, average_voxels, fit_planes
 from pipecore.tiling import detect_in_tiles, estimate_need, memory
 from pipecore.tiling.memory import BASE_BYTES, GIB, ONE_PIECE_BYTES, keeping_within, tile_bytes
 from pipecore.tiling.quantile import quantile
+from pipecore.tiling.slabs import MARGIN, parts_of, slab_bounds
 from pipecore.tiling.store import temporary_store
-from pipecore.tiling.thinning import MARGIN, parts_of, slab_bounds
 from pipecore.types import PointCloud
 from tests.core.shapes import cloud_of, parents, plane, tube
 
@@ -43,14 +43,16 @@ def scanned(rng, tmp_path):
 
 
 def test_that_a_slab_with_its_margin_has_the_normals_of_the_whole(rng):
-    thinned = average_voxels(pipe_cloud(rng).xyz, 0.009)
-    whole = fit_planes(thinned.xyz, thinned.voxel)
-    x = thinned.xyz[:, 0]
+    downsampled = average_voxels(pipe_cloud(rng).xyz, 0.009)
+    whole = fit_planes(downsampled.xyz, downsampled.voxel)
+    x = downsampled.xyz[:, 0]
     low, high = np.quantile(x, np.sort(rng.random(2)))
-    margin = WIDEST_NEIGHBOURHOOD * thinned.voxel
+    margin = WIDEST_NEIGHBOURHOOD * downsampled.voxel
     near = (x >= low - margin) & (x <= high + margin)
     own = (x >= low) & (x <= high)
-    for part, all_values in zip(fit_planes(thinned.xyz[near], thinned.voxel), whole, strict=True):
+    for part, all_values in zip(
+        fit_planes(downsampled.xyz[near], downsampled.voxel), whole, strict=True
+    ):
         assert_array_equal(part[own[near]], all_values[own])
 
 
@@ -60,7 +62,8 @@ def test_that_the_voxels_of_a_part_are_those_of_the_whole(rng):
     whole = average_voxels(xyz, edge)
     part = np.floor(xyz[:, 0].astype(np.float64) / edge) < 30
     assert_array_equal(
-        average_voxels(xyz[part], edge).xyz, whole.xyz[np.unique(parents(whole.behind)[part])]
+        average_voxels(xyz[part], edge).xyz,
+        whole.xyz[np.unique(parents(whole.full_resolution_points)[part])],
     )
 
 

@@ -14,16 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import bends as kernels
-from pipecore.elements.fittings.straight_ends import End, StraightEnd, lean_of, straight_ends
+from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
 from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS, Fitted, axis_through
+from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement, axis_through
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,
     SurfaceFit,
     fit_surface,
 )
+from pipecore.elements.runs.ends import End
 from pipecore.geometry import ArcAxis, cross, unit
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
@@ -105,7 +106,7 @@ class Corner:
 
 
 def find_corners(
-    fitted: list[Fitted],
+    fitted: list[FittedElement],
     nearby: NearbyPoints,
     progress: Progress = NoProgress(),
     span: tuple[float, float] = (0.0, 1.0),
@@ -114,7 +115,7 @@ def find_corners(
 
     Parameters
     ----------
-    fitted : list of Fitted
+    fitted : list of FittedElement
     nearby : NearbyPoints
     progress : Progress
     span : (float, float)
@@ -161,7 +162,7 @@ def _may_meet(ends: list[StraightEnd]) -> Iterator[tuple[int, int]]:
 
 
 def corner_between(
-    fitted: list[Fitted], one: StraightEnd, other: StraightEnd, nearby: NearbyPoints
+    fitted: list[FittedElement], one: StraightEnd, other: StraightEnd, nearby: NearbyPoints
 ) -> tuple[int, Corner, float] | None:
     """The corner that two ends make: number of points on its bend, corner, bend radius."""
     smaller = min(one.radius, other.radius)
@@ -186,7 +187,7 @@ def corner_between(
     return None if best is None else (best[0], corner, best[1])
 
 
-def axis_sd(found: Fitted, place: Array) -> float:
+def axis_sd(found: FittedElement, place: Array) -> float:
     """Standard deviation of a straight's axis abreast of a place, across it, metres."""
     model, covariance = found.fit.model, found.fit.covariance
     assert isinstance(model, LineSurface)
@@ -269,7 +270,7 @@ def pipe_residuals(
 
 def fit_bend(
     corner: Corner, bend_radius: float, nearby: NearbyPoints, usable: NDArray[np.bool_]
-) -> Fitted | None:
+) -> FittedElement | None:
     """Fit the bend radius, and the pipe's radius in the bend, to all points around a corner.
 
     Parameters
@@ -279,11 +280,11 @@ def fit_bend(
         Where to start.
     nearby : NearbyPoints
     usable : ndarray of bool
-        Thinned points that are free or on the straights.
+        Downsampled points that are free or on the straights.
 
     Returns
     -------
-    Fitted or None
+    FittedElement or None
         None where the points do not carry the bend radius. Its covariance is that of a
         torus whose other parameters are known.
     """
@@ -292,7 +293,7 @@ def fit_bend(
     furthest = 1.4 * bend_radius * corner.half_tangent + radius
     ball = nearby.within_ball(corner.place, furthest + 1.2 * radius)
     ball = ball[usable[ball]]
-    _, xyz, normals = nearby.of_cloud(ball)
+    _, xyz, normals = nearby.full_resolution_with_normals(ball)
     if len(xyz) > MAX_POINTS:
         order = sample_evenly(np.lexsort(xyz.T), MAX_POINTS)
         xyz, normals = xyz[order], normals[order]
@@ -330,7 +331,7 @@ def _fitted(
     sds: tuple[float, float],
     nearby: NearbyPoints,
     ball: Indices,
-) -> Fitted | None:
+) -> FittedElement | None:
     axis, model = corner.axis(bend_radius), corner.surface(bend_radius, radius)
     xyz, normals = nearby.surface.xyz[ball], nearby.surface.normals[ball]
     residual, _, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
@@ -340,7 +341,7 @@ def _fitted(
         return None
     own = ball[on]
     chainage, _, clock = axis.pipe_coordinates(xyz[on])
-    lean = lean_of(normals[on], outward[on], axis.tangent(chainage))
+    lean = normal_angle(normals[on], outward[on], axis.tangent(chainage))
     extent = find_extent(
         chainage, clock, residual[on], lean, lambda *_: np.empty((2, 0)),
         axis.length, radius, nearby.usual_spacing(own), sigma,
@@ -350,11 +351,11 @@ def _fitted(
     covered = extent.coverage * (extent.high - extent.low) / axis.length
     extent = Extent(0.0, axis.length, extent.arc, min(covered, 1.0), extent.gaps)
     misfit = section_misfit(clock, residual[on], extent.arc)
-    free = fit_surface(model, nearby.of_cloud(own)[1], 3.0 * sigma)
+    free = fit_surface(model, nearby.full_resolution_with_normals(own)[1], 3.0 * sigma)
     if free is not None and np.sqrt(free.covariance[5, 5]) < FREE_SD * bend_radius:
         ends = np.stack([axis.start, axis.end])
-        return Fitted(free, axis_through(free.model, ends), own, extent, misfit)
+        return FittedElement(free, axis_through(free.model, ends), own, extent, misfit)
     covariance = np.zeros((7, 7))
     covariance[5, 5], covariance[6, 6] = sds[0] ** 2, sds[1] ** 2
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
-    return Fitted(fit, axis, own, extent, misfit)
+    return FittedElement(fit, axis, own, extent, misfit)

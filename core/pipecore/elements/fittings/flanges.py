@@ -1,6 +1,6 @@
 """Flanges: rings about the axis of a straight pipe, wider than it and short.
 
-Their rims are so short that few thinned points have normals across them, and so few that
+Their rims are so short that few downsampled points have normals across them, and so few that
 a free fit would not know their axis. But a flange sits on a pipe whose axis is known: about
 that axis its rim is a line of one radius, and only this radius and its ends are unknown.
 """
@@ -14,9 +14,9 @@ from scipy import ndimage
 
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.nearby_points import OUTER, NearbyPoints
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
-from pipecore.elements.runs import Lines
+from pipecore.elements.runs.ends import LineIndex, Link
 from pipecore.geometry import LineAxis
 from pipecore.robust import robust_sd
 
@@ -59,16 +59,16 @@ class _Shell:
 
 
 def find_flanges(
-    fitted: list[Fitted], nearby: NearbyPoints, is_free: NDArray[np.bool_]
-) -> Iterator[Fitted]:
+    fitted: list[FittedElement], nearby: NearbyPoints, is_free: NDArray[np.bool_]
+) -> Iterator[FittedElement]:
     """Find the rings around straights, each pipe's most complete first.
 
     Parameters
     ----------
-    fitted : list of Fitted
+    fitted : list of FittedElement
     nearby : NearbyPoints
     is_free : ndarray of bool
-        Thinned points that no element has taken; looked at anew for each ring, so that
+        Downsampled points that no element has taken; looked at anew for each ring, so that
         the caller can mark what a ring took.
     """
     for f in fitted:
@@ -88,9 +88,9 @@ def find_flanges(
 def _shell(
     axis: LineAxis, radius: float, nearby: NearbyPoints, is_free: NDArray[np.bool_]
 ) -> _Shell:
-    """Free thinned points wider than the pipe that do not face along it."""
+    """Free downsampled points wider than the pipe that do not face along it."""
     widest = min(FLANGE_RATIO[1] * radius, radius + MAX_OVERHANG)
-    near = nearby.thinned(axis, widest / OUTER, REACH * radius + LONGEST)
+    near = nearby.around_axis(axis, widest / OUTER, REACH * radius + LONGEST)
     near = near[is_free[near]]
     chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[near])
     up, right = axis.frame(chainage)
@@ -154,14 +154,14 @@ def longest_run(seen: NDArray[np.bool_]) -> NDArray[np.intp]:
 
 
 def _fit_ring(
-    pipe: Fitted,
+    pipe: FittedElement,
     shell: _Shell,
     ends: tuple[float, float],
     radius: float,
     tolerance: float,
     nearby: NearbyPoints,
     is_free: NDArray[np.bool_],
-) -> Fitted | None:
+) -> FittedElement | None:
     """Fit a ring's radius about the pipe's axis to all points there; None if it is no ring."""
     axis = pipe.axis
     assert isinstance(axis, LineAxis)
@@ -169,7 +169,7 @@ def _fit_ring(
     near = (shell.chainage > ends[0] - voxel) & (shell.chainage < ends[1] + voxel)
     near &= (np.abs(shell.rho - radius) < 2.0 * tolerance) & is_free[shell.index]
     own = shell.index[near]
-    _, xyz, _ = nearby.of_cloud(own)
+    _, xyz, _ = nearby.full_resolution_with_normals(own)
     if len(xyz) < MIN_POINTS:
         return None
     chainage, rho, clock = axis.pipe_coordinates(xyz)
@@ -199,10 +199,10 @@ def _fit_ring(
     model = LineSurface(axis.at(0.5 * (low + high)), axis.direction, radius)
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
     ring = LineAxis(start, axis.direction, float(high - low))
-    return Fitted(fit, ring, own, Extent(0.0, ring.length, arc, 1.0, ()), misfit)
+    return FittedElement(fit, ring, own, Extent(0.0, ring.length, arc, 1.0, ()), misfit)
 
 
-def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
+def pair_flanges(fitted: list[FittedElement]) -> list[Link]:
     """Pairs (flange, pipe): short discs around the axis of a thinner pipe, at or on it."""
     pipes = [
         (j, f)
@@ -210,7 +210,7 @@ def flanges(fitted: list[Fitted]) -> list[tuple[int, int]]:
         if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered
     ]
     found = []
-    lines = Lines([f.axis for _, f in pipes])
+    lines = LineIndex([f.axis for _, f in pipes])
     reaches = np.array([REACH * f.fit.model.radius + LONGEST for _, f in pipes])
     for i, disc in pipes:
         if disc.axis.length > MAX_LENGTH * disc.fit.model.radius:

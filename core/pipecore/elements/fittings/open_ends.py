@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import bends as kernels
 from pipecore.elements.fittings.straight_ends import NO_ELLIPSES, StraightEnd
-from pipecore.elements.proposals import Piece, arc_angles
+from pipecore.elements.proposals import Proposal, arc_angles
 from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import RADIAL_COS
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
@@ -85,9 +85,9 @@ class ViewFromEnd:
         )
 
 
-def follow_end(
+def extend_open_end(
     end: StraightEnd, nearby: NearbyPoints, is_free: Flags
-) -> tuple[Piece, Piece | None] | None:
+) -> tuple[Proposal, Proposal | None] | None:
     """Look for a bend at the end of a straight.
 
     Parameters
@@ -95,11 +95,11 @@ def follow_end(
     end : StraightEnd
     nearby : NearbyPoints
     is_free : ndarray of bool
-        Thinned points that no element has taken.
+        Downsampled points that no element has taken.
 
     Returns
     -------
-    tuple of Piece and (Piece or None), or None
+    tuple of Proposal and (Proposal or None), or None
         The bend, and the straight beyond it if points show one.
     """
     radius, origin, ahead = end.radius, end.point, end.outward
@@ -140,7 +140,7 @@ def follow_end(
     )
     on, angle = view.bent(start, bend_radius, np.array([azimuth]), tolerance)
     low = float(arc_angles(bend, begin[None])[0])
-    piece = Piece(bend, NO_ELLIPSES, low, low + float(np.quantile(angle[on], 0.98)))
+    piece = Proposal(bend, NO_ELLIPSES, low, low + float(np.quantile(angle[on], 0.98)))
     return piece, _straight_beyond(bend, inward, ahead, nearby, is_free)
 
 
@@ -150,7 +150,7 @@ def _straight_beyond(
     ahead: Array,
     nearby: NearbyPoints,
     is_free: Flags,
-) -> Piece | None:
+) -> Proposal | None:
     """The straight, of those that leave a bend at some angle, that most points are on."""
     radius, half = bend.radius, 0.5 * BEYOND * bend.radius
     tolerance = max(3.0 * nearby.surface.noise, OFF * radius)
@@ -165,6 +165,6 @@ def _straight_beyond(
             model, model.axis_between(-half, half), 0.0, is_free,
             band=tolerance, depth=radius, min_cos=RADIAL_COS,
         )  # fmt: skip
-        if len(on.own) > most:
-            best, most = Piece(model, NO_ELLIPSES, -half, half), len(on.own)
+        if len(on.inliers) > most:
+            best, most = Proposal(model, NO_ELLIPSES, -half, half), len(on.inliers)
     return best

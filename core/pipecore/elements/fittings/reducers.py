@@ -13,10 +13,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.fittings.straight_ends import StraightEnd, lean_of, straight_ends
+from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
 from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS, Fitted, axis_through
+from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement, axis_through
 from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SurfaceFit,
@@ -56,7 +56,7 @@ FREE_SD = 0.006
 """A reducer whose own points carry its radius to this share needs no straights for it."""
 
 
-def find_steps(fitted: list[Fitted]) -> list["Step"]:
+def find_steps(fitted: list[FittedElement]) -> list["Step"]:
     """Straights on one line but of different radii, near each other; the furthest first.
 
     What lies between two is then known before it may be taken for a straight itself.
@@ -65,7 +65,7 @@ def find_steps(fitted: list[Fitted]) -> list["Step"]:
     return sorted(_steps(ends), key=lambda step: -step.gap)
 
 
-def _is_pipe(straight: Fitted) -> bool:
+def _is_pipe(straight: FittedElement) -> bool:
     """Whether a straight is longer than a flange or the end of something else."""
     return straight.axis.length > MIN_PIPE * straight.fit.model.radius
 
@@ -124,7 +124,7 @@ class Step:
         """Radius of the narrower straight."""
         return min(self.one.radius, self.other.radius)
 
-    def has_between(self, straight: Fitted) -> bool:
+    def has_between(self, straight: FittedElement) -> bool:
         """Whether a straight lies where the reducer would, and may be part of it.
 
         A cylinder fits one side of a reducer of low slope, leaning to its axis.
@@ -185,22 +185,25 @@ class Step:
 
 
 def fit_reducer(
-    step: Step, straights: tuple[Fitted, Fitted], nearby: NearbyPoints, usable: NDArray[np.bool_]
-) -> Fitted | None:
+    step: Step,
+    straights: tuple[FittedElement, FittedElement],
+    nearby: NearbyPoints,
+    usable: NDArray[np.bool_],
+) -> FittedElement | None:
     """Find where a reducer between two straights begins and ends.
 
     Parameters
     ----------
     step : Step
-    straights : tuple of Fitted
+    straights : tuple of FittedElement
         Those of its ends.
     nearby : NearbyPoints
     usable : ndarray of bool
-        Thinned points that are free or on the straights.
+        Downsampled points that are free or on the straights.
 
     Returns
     -------
-    Fitted or None
+    FittedElement or None
         None where no cone joins the straights. Unless its own points carry it, its radius
         is as sure as those of the straights.
     """
@@ -209,7 +212,7 @@ def fit_reducer(
     if high - low < SHORTEST * step.wide:
         return None
     around = LineAxis(step.one.point + low * step.direction, step.direction, high - low)
-    points = nearby.thinned(around, step.wide, 0.0)
+    points = nearby.around_axis(around, step.wide, 0.0)
     xyz = nearby.surface.xyz[points]
     chainage, rho, _ = around.pipe_coordinates(xyz)
     outward = (xyz - around.at(chainage)) / rho[:, None]
@@ -245,11 +248,11 @@ def _fitted(
     step: Step,
     begin: float,
     end: float,
-    straights: tuple[Fitted, Fitted],
+    straights: tuple[FittedElement, FittedElement],
     nearby: NearbyPoints,
     points: NDArray[np.intp],
     band: float,
-) -> Fitted | None:
+) -> FittedElement | None:
     xyz, normals = nearby.surface.xyz[points], nearby.surface.normals[points]
     axis, model = step.axis(begin, end), step.cone(begin, end)
     chainage, rho, clock = axis.pipe_coordinates(xyz)
@@ -261,7 +264,7 @@ def _fitted(
     if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
         return None
     own, sigma = points[on], max(robust_sd(residual[on]), LEAST_SIGMA)
-    lean = lean_of(normals[on], outward[on], axis.tangent(chainage[on]))
+    lean = normal_angle(normals[on], outward[on], axis.tangent(chainage[on]))
     extent = find_extent(
         chainage[on], clock[on], residual[on], lean, lambda *_: np.empty((2, 0)),
         axis.length, model.radius, nearby.usual_spacing(own), sigma,
@@ -271,14 +274,16 @@ def _fitted(
     covered = min(extent.coverage * (extent.high - extent.low) / axis.length, 1.0)
     extent = Extent(0.0, axis.length, extent.arc, covered, extent.gaps)
     misfit = section_misfit(clock[on], residual[on], extent.arc)
-    free = fit_surface(model, nearby.behind(own)[1], 3.0 * sigma)
+    free = fit_surface(model, nearby.full_resolution(own)[1], 3.0 * sigma)
     if free is not None and free.radius_sd < FREE_SD * free.model.radius:
         ends = np.stack([axis.start, axis.end])
-        return Fitted(free, axis_through(free.model, ends), own, extent, misfit)
+        return FittedElement(free, axis_through(free.model, ends), own, extent, misfit)
     sds = np.array([s.radius_sd for s in straights])
     across = sigma**2 / on.sum()
     tilt = 12.0 * across / axis.length**2
     covariance = np.diag(
         [across, across, tilt, tilt, (sds @ sds) / 4, (sds @ sds) / axis.length**2]
     )
-    return Fitted(SurfaceFit(model, covariance, sigma, int(on.sum())), axis, own, extent, misfit)
+    return FittedElement(
+        SurfaceFit(model, covariance, sigma, int(on.sum())), axis, own, extent, misfit
+    )

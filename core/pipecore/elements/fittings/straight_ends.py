@@ -5,12 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface
+from pipecore.elements.runs.ends import End
 
 Array = NDArray[np.float64]
-End = tuple[int, int]
-"""An end of a fitted straight: its number, and 0 for its start or 1 for its end."""
 NO_ELLIPSES: NDArray[np.intp] = np.empty(0, np.intp)
 
 
@@ -23,7 +22,7 @@ class StraightEnd(NamedTuple):
     radius: float
 
 
-def straight_ends(fitted: list[Fitted], first: int = 0) -> list[StraightEnd]:
+def straight_ends(fitted: list[FittedElement], first: int = 0) -> list[StraightEnd]:
     """Ends of the cylinders, from the piece with the number `first` on."""
     ends = []
     for i, f in enumerate(fitted[first:], start=first):
@@ -34,7 +33,7 @@ def straight_ends(fitted: list[Fitted], first: int = 0) -> list[StraightEnd]:
     return ends
 
 
-def lean_of(normals: Array, outward: Array, tangent: Array) -> Array:
+def normal_angle(normals: Array, outward: Array, tangent: Array) -> Array:
     """Angle from the surface's outward normals to the points' own, towards increasing clock."""
     clockwise = np.cross(tangent, outward)
     ahead = np.einsum("ij,ij->i", normals, clockwise)

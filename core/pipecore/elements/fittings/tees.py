@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.elements.refinement.extent import Extent
-from pipecore.elements.refinement.refine import Fitted
-from pipecore.elements.runs import Lines, Span
+from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.runs.ends import AxisSpan, LineIndex
 from pipecore.geometry import ArcAxis, LineAxis
 
 BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
@@ -44,18 +44,18 @@ class Junction:
     """Whether the branch is wide enough for a tee."""
 
 
-def find_junctions(spans: list[Span], met: set[tuple[int, int]]) -> list[Junction]:
+def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Junction]:
     """Ends that run into the side of a straight of no smaller radius.
 
     Parameters
     ----------
-    spans : list of Span
+    spans : list of AxisSpan
         Of all elements.
     met : set of (int, int)
         Ends (element, 0 for its start or 1 for its end) that another element follows.
     """
     found = []
-    lines = Lines([span.axis for span in spans])
+    lines = LineIndex([span.axis for span in spans])
     radii = np.array([max(span.radii) for span in spans])
     for i, branch in enumerate(spans):
         for end in (0, 1):
@@ -123,44 +123,44 @@ def tee_ends(chainages: list[float], length: float, radius: float) -> list[tuple
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class ElementPart:
     """An element, or a stretch of one that tees have cut: `whole` is the element's number."""
 
-    found: Fitted
+    found: FittedElement
     axis: LineAxis | ArcAxis
     whole: int
     is_tee: bool = False
 
 
 def cut_tees(
-    fitted: list[Fitted],
+    fitted: list[FittedElement],
     axes: list[LineAxis | ArcAxis],
     tees: list[Junction],
     xyz: NDArray[np.float64],
-) -> list[Part]:
+) -> list[ElementPart]:
     """Cut runs into their tees and what is left between them.
 
     Parameters
     ----------
-    fitted : list of Fitted
+    fitted : list of FittedElement
     axes : list of LineAxis or ArcAxis
         Theirs, trimmed to what they meet.
     tees : list of Junction
     xyz : ndarray, shape (n, 3)
-        The thinned points.
+        The downsampled points.
 
     Returns
     -------
-    list of Part
+    list of ElementPart
         In the order of the elements; the parts of one follow each other along its axis.
     """
     parts = []
     for i, (found, axis) in enumerate(zip(fitted, axes, strict=True)):
         middles = [t.chainage for t in tees if t.run == i]
         if not middles or not isinstance(axis, LineAxis):
-            parts.append(Part(found, axis, i))
+            parts.append(ElementPart(found, axis, i))
             continue
-        chainage = (xyz[found.own] - axis.start) @ axis.direction
+        chainage = (xyz[found.inliers] - axis.start) @ axis.direction
         at = -np.inf
         ends = tee_ends(middles, axis.length, found.fit.model.radius)
         borders = [0.0, *(b for pair in ends for b in pair), axis.length]
@@ -168,14 +168,16 @@ def cut_tees(
             if high - low < 1e-9:
                 continue
             upto = high if high < axis.length else np.inf
-            own = found.own[(chainage >= at) & (chainage < upto)]
+            own = found.inliers[(chainage >= at) & (chainage < upto)]
             at = upto
             piece = _cut(found, axis, low, high, own)
-            parts.append(Part(piece, piece.axis, i, is_tee=k % 2 == 1))
+            parts.append(ElementPart(piece, piece.axis, i, is_tee=k % 2 == 1))
     return parts
 
 
-def _cut(run: Fitted, axis: LineAxis, low: float, high: float, own: NDArray[np.intp]) -> Fitted:
+def _cut(
+    run: FittedElement, axis: LineAxis, low: float, high: float, own: NDArray[np.intp]
+) -> FittedElement:
     """The stretch of a run between two chainages of its trimmed axis."""
     piece = LineAxis(axis.at(low), axis.direction, high - low)
     shift = float(run.axis.pipe_coordinates(piece.start[None])[0][0])
@@ -185,4 +187,4 @@ def _cut(run: Fitted, axis: LineAxis, low: float, high: float, own: NDArray[np.i
         if b > shift and a < shift + piece.length
     )
     extent = Extent(0.0, piece.length, run.extent.arc, run.extent.coverage, gaps)
-    return replace(run, axis=piece, own=own, extent=extent)
+    return replace(run, axis=piece, inliers=own, extent=extent)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipecore.elements.gates.waviness import waviness
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
 from pipecore.settings import ElementSettings
 from pipecore.surface import Surface
@@ -52,7 +52,7 @@ WIDE, WHOLE_ARC, MIN_WIDE_LENGTH = 0.18, np.deg2rad(200.0), 0.6
 class Trial:
     """A refined piece before its gates; `slack` eases what a last round of fitting can mend."""
 
-    found: Fitted
+    found: FittedElement
     settings: ElementSettings
     surface: Surface
     slack: float = 1.0
@@ -83,12 +83,12 @@ class Trial:
         return self.found.extent.arc
 
 
-def has_a_wanted_size(t: Trial) -> bool:
+def radius_is_within_limits(t: Trial) -> bool:
     """The radius is within the settings' limits."""
     return t.settings.min_radius_mm <= t.radius * 1e3 <= t.settings.max_radius_mm
 
 
-def lies_on_its_points(t: Trial) -> bool:
+def scatter_is_low(t: Trial) -> bool:
     """The points scatter about the surface hardly more than they do about their planes."""
     wavy = _allowed_waviness(t, *SCATTER)
     limit = min(max(4.0 * t.surface.noise, 0.004, wavy), 0.08 * t.radius)
@@ -107,17 +107,17 @@ def _allowed_waviness(t: Trial, least: float, most: float) -> float:
     return (least + (most - least) * share) * t.radius
 
 
-def has_a_known_radius(t: Trial) -> bool:
+def radius_is_well_determined(t: Trial) -> bool:
     """The points carry the radius at all."""
     return t.relative_sd <= MAX_RADIUS_SD
 
 
-def has_many_points(t: Trial) -> bool:
+def has_enough_points(t: Trial) -> bool:
     """A sphere shows more than a handful of points."""
-    return len(t.found.own) >= MIN_SPHERE_POINTS
+    return len(t.found.inliers) >= MIN_SPHERE_POINTS
 
 
-def is_a_ball_all_over(t: Trial) -> bool:
+def sphere_fits_everywhere(t: Trial) -> bool:
     """Every patch of a sphere is on it."""
     share, more = MAX_SPHERE_MISFIT
     return t.misfit < share * t.radius + more
@@ -128,29 +128,29 @@ def is_round(t: Trial) -> bool:
     return t.misfit < MAX_MISFIT * t.radius + MAX_NOISE_MISFIT * t.found.fit.sigma
 
 
-def is_covered(t: Trial) -> bool:
+def axis_is_covered(t: Trial) -> bool:
     """Points lie along most of the axis."""
     return t.found.extent.coverage >= MIN_COVERAGE / t.slack
 
 
-def shows_enough_arc(t: Trial) -> bool:
+def arc_is_wide_enough(t: Trial) -> bool:
     """Points lie around enough of the axis; less is enough for a straight known sharply."""
     is_straight = isinstance(t.found.fit.model, LineSurface)
     is_very_sharp = is_straight and t.relative_sd < VERY_SHARP_RADIUS_SD
     return bool(t.arc >= (MIN_SHARP_ARC if is_very_sharp else MIN_ARC) / t.slack)
 
 
-def is_sharp_for_its_arc(t: Trial) -> bool:
+def radius_is_precise_for_its_arc(t: Trial) -> bool:
     """A short arc is believed only where the radius is known well."""
     is_long = isinstance(t.found.fit.model, LineSurface) and t.lengths > LONG
     return t.arc >= SURE_ARC or t.relative_sd < (LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD)
 
 
-def is_no_cloth(t: Trial) -> bool:
+def surface_is_smooth(t: Trial) -> bool:
     """The surface does not leave its shape all over; asked of finished fits only."""
     if t.slack > 1.0:
         return True
-    xyz = t.surface.xyz[t.found.own]
+    xyz = t.surface.xyz[t.found.inliers]
     residual, _, _ = t.found.fit.model.residuals(xyz)
     chainage, _, clock = t.found.axis.pipe_coordinates(xyz)
     if t.found.section is not None:
@@ -159,35 +159,35 @@ def is_no_cloth(t: Trial) -> bool:
     return not wave > _allowed_waviness(t, *WAVINESS)
 
 
-def shows_the_arc_of_a_bend(t: Trial) -> bool:
+def bend_arc_is_wide_enough(t: Trial) -> bool:
     """A torus has more parameters to satisfy than a cylinder."""
     return bool(t.arc >= MIN_BEND_ARC)
 
 
-def has_a_known_bend_radius(t: Trial) -> bool:
+def bend_radius_is_well_determined(t: Trial) -> bool:
     """The points carry the bend radius."""
     model, sd = t.found.fit.model, np.sqrt(t.found.fit.covariance[5, 5]) / t.slack**2
     return isinstance(model, ArcSurface) and bool(sd < MAX_BEND_RADIUS_SD * model.bend_radius)
 
 
-def leaves_a_hole(t: Trial) -> bool:
+def bend_radius_exceeds_radius(t: Trial) -> bool:
     """A bend turns about a point outside itself."""
     model = t.found.fit.model
     return isinstance(model, ArcSurface) and model.bend_radius > MIN_BEND_RADIUS * t.radius
 
 
-def is_no_sliver_of_a_bend(t: Trial) -> bool:
+def bend_is_long_enough(t: Trial) -> bool:
     """A bend has some length."""
     return t.lengths > MIN_BEND_LENGTH
 
 
-def really_tapers(t: Trial) -> bool:
+def cone_tapers_clearly(t: Trial) -> bool:
     """A cone's radius changes clearly over some length."""
     start, end = t.found.radii
     return abs(end - start) > MIN_TAPER_CHANGE * t.radius and t.lengths > MIN_TAPER_LENGTH
 
 
-def is_longer_than_a_slice(t: Trial) -> bool:
+def cylinder_is_long_enough(t: Trial) -> bool:
     """A cylinder is longer than a few points, and than a slice of a vessel's head."""
     is_wide = t.radius > WIDE and t.arc < WHOLE_ARC
     shortest = MIN_WIDE_LENGTH * t.radius if is_wide else 0.0
@@ -196,24 +196,31 @@ def is_longer_than_a_slice(t: Trial) -> bool:
 
 Gate = Callable[[Trial], bool]
 
-OF_ALL: tuple[Gate, ...] = (has_a_wanted_size, lies_on_its_points, has_a_known_radius)
-OF_TUBES = (*OF_ALL, is_round, is_covered, shows_enough_arc, is_sharp_for_its_arc, is_no_cloth)
+OF_ALL: tuple[Gate, ...] = (radius_is_within_limits, scatter_is_low, radius_is_well_determined)
+OF_TUBES = (
+    *OF_ALL,
+    is_round,
+    axis_is_covered,
+    arc_is_wide_enough,
+    radius_is_precise_for_its_arc,
+    surface_is_smooth,
+)
 GATES: dict[str, tuple[Gate, ...]] = {
-    "sphere": (*OF_ALL, has_many_points, is_a_ball_all_over),
+    "sphere": (*OF_ALL, has_enough_points, sphere_fits_everywhere),
     "bend": (
         *OF_TUBES,
-        shows_the_arc_of_a_bend,
-        has_a_known_bend_radius,
-        leaves_a_hole,
-        is_no_sliver_of_a_bend,
+        bend_arc_is_wide_enough,
+        bend_radius_is_well_determined,
+        bend_radius_exceeds_radius,
+        bend_is_long_enough,
     ),
-    "cone": (*OF_TUBES, really_tapers),
-    "cylinder": (*OF_TUBES, is_longer_than_a_slice),
+    "cone": (*OF_TUBES, cone_tapers_clearly),
+    "cylinder": (*OF_TUBES, cylinder_is_long_enough),
 }
 """What each shape must fulfil, in the order in which it is asked."""
 
 
-def _shape(found: Fitted) -> str:
+def _shape(found: FittedElement) -> str:
     match found.fit.model:
         case SphereSurface():
             return "sphere"
@@ -225,15 +232,15 @@ def _shape(found: Fitted) -> str:
 
 
 def failed_gate(
-    found: Fitted, surface: Surface, settings: ElementSettings, slack: float = 1.0
+    found: FittedElement, surface: Surface, settings: ElementSettings, slack: float = 1.0
 ) -> str | None:
     """Name of the first gate that a refined piece fails, or None.
 
     Parameters
     ----------
-    found : Fitted
+    found : FittedElement
     surface : Surface
-        The thinned points.
+        The downsampled points.
     settings : ElementSettings
     slack : float
         Multiplies the limits of what a last round of fitting can mend.
@@ -245,8 +252,8 @@ def failed_gate(
     return None
 
 
-def is_credible(
-    found: Fitted, surface: Surface, settings: ElementSettings, slack: float = 1.0
+def passes_gates(
+    found: FittedElement, surface: Surface, settings: ElementSettings, slack: float = 1.0
 ) -> bool:
     """Whether a refined piece is a pipe element; see `failed_gate`."""
     return failed_gate(found, surface, settings, slack) is None

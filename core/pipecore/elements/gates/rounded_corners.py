@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface
 
 Array = NDArray[np.float64]
@@ -33,12 +33,12 @@ MAX_ARC = np.deg2rad(225.0)
 """What is seen further round than this, twice what a corner turns by, is no corner."""
 
 
-def is_rounded_corner(found: Fitted, nearby: NearbyPoints) -> bool:
+def is_rounded_corner(found: FittedElement, nearby: NearbyPoints) -> bool:
     """Whether planes touch a cylinder all along on both sides.
 
     Parameters
     ----------
-    found : Fitted
+    found : FittedElement
     nearby : NearbyPoints
     """
     model = found.fit.model
@@ -47,7 +47,7 @@ def is_rounded_corner(found: Fitted, nearby: NearbyPoints) -> bool:
     return min(touching_planes(found, nearby)) > MIN_SHARE
 
 
-def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
+def touching_planes(found: FittedElement, nearby: NearbyPoints) -> tuple[float, float]:
     """How much there is of planes in which a cylinder's arc goes on, before it and after it.
 
     1 is a plane without holes; before and after are in the sense of increasing clock. A plane
@@ -58,9 +58,9 @@ def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
     nearest = max(NEAREST, float(np.arccos(1.0 / (1.0 + CLEAR * noise / radius))))
     if FURTHEST - nearest < LEAST_PART:
         return 0.0, 0.0
-    thinned = nearby.thinned(axis, radius, 0.0)
-    chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[thinned])
-    normals = nearby.surface.normals[thinned]
+    downsampled = nearby.around_axis(axis, radius, 0.0)
+    chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[downsampled])
+    normals = nearby.surface.normals[downsampled]
     along = np.abs(np.einsum("ij,ij->i", normals, axis.tangent(chainage)))
     up, right = axis.frame(chainage)
     x, y = np.einsum("ij,ij->i", normals, up), np.einsum("ij,ij->i", normals, right)
@@ -68,8 +68,8 @@ def touching_planes(found: Fitted, nearby: NearbyPoints) -> tuple[float, float]:
     lean = np.mod(clock - np.arctan2(y, x) + np.pi / 2, np.pi) - np.pi / 2
     tolerance = MAX_OFF * radius + 2.0 * noise
     touches = (np.abs(rho * np.cos(lean) - radius) < tolerance) & (along < MAX_TILT)
-    _, _, own_clock = axis.pipe_coordinates(nearby.surface.xyz[found.own])
-    density = axis.length / nearby.usual_spacing(found.own) ** 2
+    _, _, own_clock = axis.pipe_coordinates(nearby.surface.xyz[found.inliers])
+    density = axis.length / nearby.usual_spacing(found.inliers) ** 2
     width = radius * (np.tan(FURTHEST) - np.tan(nearest))
     shares = []
     for side in (-1.0, 1.0):

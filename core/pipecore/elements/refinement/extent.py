@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 MAX_GAP = 4.0
 """An element goes on across gaps of this many radii, or of `MAX_GAP_LENGTH`."""
 MAX_GAP_LENGTH = 0.25
-SHOWN_GAP = 2.0
+MIN_REPORTED_GAP_RADII = 2.0
 """Gaps of at least this many radii are reported."""
 MIN_COVERED_ARC = float(np.deg2rad(50.0))
 """... or `ENOUGH_OF_ARC` of what it usually shows."""
@@ -129,7 +129,7 @@ def find_extent(
     low, high = kernels.bounds_of(chainage, base, step, first, last)
     breaks: Iterable[int] = ()
     if len(part) < last - first + 1:
-        breaks = np.flatnonzero((np.diff(part) - 1) * step > SHOWN_GAP * radius)
+        breaks = np.flatnonzero((np.diff(part) - 1) * step > MIN_REPORTED_GAP_RADII * radius)
     return Extent(
         low,
         high,
@@ -137,13 +137,6 @@ def find_extent(
         len(part) / (last - first + 1),
         tuple((base + (part[b] + 1) * step, base + part[b + 1] * step) for b in breaks),
     )
-
-
-def turning_by_row(clock: Array, lean: Array, row: NDArray[np.intp], n_rows: int) -> Array:
-    """How much the normals of each row turn with the clock: 1 on a pipe, 0 on a plane."""
-    turning = np.empty(n_rows)
-    kernels.turn_of_normals(clock, lean, row, turning)
-    return turning
 
 
 def section_misfit(clock: Array, residual: Array, arc: float) -> float:

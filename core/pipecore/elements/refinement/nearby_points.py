@@ -26,7 +26,7 @@ INNER, OUTER = 0.4, 1.3
 REACH_OF_SPHERE = 1.2
 """The same of a sphere."""
 CELL_VOXELS, COARSE = 6.0, 4
-"""Edge of the cells in which thinned points are looked up, in voxels; coarse ones in fine ones."""
+"""Edge of the cells in which points are looked up, in voxels; of coarse cells, in fine ones."""
 
 FEW = 20_000
 """A rough look takes a sample where more points than this are in the cells about a surface."""
@@ -36,12 +36,12 @@ AT_ONCE, BEGUN = 2_000_000, 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class PointsOn:
-    """Thinned points on a surface, in the order of their indices, and what lies inside it.
+class PointsOnSurface:
+    """Downsampled points on a surface, in the order of their indices, and what lies inside it.
 
     Parameters
     ----------
-    own : ndarray of int, shape (n,)
+    inliers : ndarray of int, shape (n,)
     residual, chainage, clock, lean : ndarray, shape (n,)
         Distance from the surface, pipe coordinates, and the angle from the surface's normal
         to the point's own, towards increasing clock.
@@ -52,7 +52,7 @@ class PointsOn:
         Distance between neighbours among the points looked at, metres.
     """
 
-    own: Indices
+    inliers: Indices
     residual: Array
     chainage: Array
     clock: Array
@@ -60,13 +60,13 @@ class PointsOn:
     inside: Callable[[float, float], Array]
     spacing: float
 
-    def about(self, section: SectionModel, band: float) -> "PointsOn":
+    def about(self, section: SectionModel, band: float) -> "PointsOnSurface":
         """Those within `band` of a section model, with distances from that."""
         residual = self.residual - section.height(self.chainage, self.clock)
         on = np.flatnonzero(np.abs(residual) <= band)
         return replace(
             self,
-            own=self.own[on],
+            inliers=self.inliers[on],
             residual=residual[on],
             chainage=self.chainage[on],
             clock=self.clock[on],
@@ -86,7 +86,7 @@ def _in_order_met(
 
 
 class NearbyPoints:
-    """Looks up thinned points around an axis, and the cloud's points behind them.
+    """Looks up downsampled points around an axis, and the cloud's points behind them.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class NearbyPoints:
     progress : Progress
         Told now and then while the points are put into cells.
     allocate : callable
-        Makes the arrays with a value for each thinned point.
+        Makes the arrays with a value for each downsampled point.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class NearbyPoints:
     ) -> None:
         self._cloud = cloud
         self.surface = surface
-        self._members, self._starts = surface.behind
+        self._members, self._starts = surface.full_resolution_points
         edge = CELL_VOXELS * surface.voxel
         frame = GridFrame.of(surface.xyz, edge)
         first, _, n_y, n_z = frame.numbers
@@ -136,8 +136,8 @@ class NearbyPoints:
         points = allocate("points_of_cells", (len(cell),), np.int32)
         self._cells = points, group_into(cell, len(order), points)
 
-    def thinned(self, axis: Axis, radius: float, margin: float) -> Indices:
-        """Thinned points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
+    def around_axis(self, axis: Axis, radius: float, margin: float) -> Indices:
+        """Downsampled points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
         inner, outer = INNER * radius, OUTER * radius
         cells = kernels.cells_around(
             *self._grid, axis.numbers, inner, outer, -margin, axis.length + margin
@@ -159,8 +159,8 @@ class NearbyPoints:
         depth: float,
         min_cos: float,
         is_rough: bool = False,
-    ) -> PointsOn:
-        """Free thinned points on a surface about an axis, and what lies inside it.
+    ) -> PointsOnSurface:
+        """Free downsampled points on a surface about an axis, and what lies inside it.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class NearbyPoints:
         margin : float
             How far beyond the axis's ends points are looked for, metres.
         is_free : ndarray of bool
-            Thinned points that may be on the surface.
+            Downsampled points that may be on the surface.
         band, depth : float
             Points are on it up to the former distance, and inside from the latter on.
         min_cos : float
@@ -199,7 +199,7 @@ class NearbyPoints:
             return found
 
         residual, chainage, clock, lean = columns
-        return PointsOn(own, residual, chainage, clock, lean, look_inside, spacing)
+        return PointsOnSurface(own, residual, chainage, clock, lean, look_inside, spacing)
 
     def on_sphere(
         self,
@@ -210,7 +210,7 @@ class NearbyPoints:
         min_cos: float,
         is_rough: bool = False,
     ) -> Indices:
-        """Free thinned points within `band` of a sphere whose normals are like its own.
+        """Free downsampled points within `band` of a sphere whose normals are like its own.
 
         A rough look takes a sample of them where there are many.
         """
@@ -225,33 +225,33 @@ class NearbyPoints:
             )
         )  # fmt: skip
 
-    def usual_spacing(self, thinned: Indices) -> float:
-        """Distance between neighbours among some thinned points, not below the thinning's."""
-        return float(kernels.usual_spacing(self.surface.spacing, thinned, self.surface.voxel))
+    def usual_spacing(self, downsampled: Indices) -> float:
+        """Distance between neighbours among some downsampled points, not below the thinning's."""
+        return float(kernels.usual_spacing(self.surface.spacing, downsampled, self.surface.voxel))
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
-        """Thinned points within `radius` of a place, in order."""
+        """Downsampled points within `radius` of a place, in order."""
         cells = kernels.cells_in_shell(*self._grid, centre, 0.0, radius)
         return np.asarray(
             kernels.points_in_ball(self.surface.xyz, *self._cells, cells, centre, radius)
         )
 
-    def behind(self, thinned: Indices) -> tuple[Indices, Array]:
-        """Indices and coordinates of the cloud's points behind thinned points.
+    def full_resolution(self, downsampled: Indices) -> tuple[Indices, Array]:
+        """Indices and coordinates of the cloud's points behind downsampled points.
 
-        Those behind one thinned point are in the order of their coordinates, so that the
+        Those behind one downsampled point are in the order of their coordinates, so that the
         cloud's own order does not matter.
         """
-        n = int(self._n_behind(thinned).sum())
+        n = int(self._n_behind(downsampled).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
-        kernels.behind(self._members, self._starts, thinned, self._cloud.xyz, index, xyz)
+        kernels.behind(self._members, self._starts, downsampled, self._cloud.xyz, index, xyz)
         return index, xyz
 
-    def of_cloud(self, thinned: Indices) -> tuple[Indices, Array, Array]:
-        """What `behind` tells, and the normals of the thinned points, one for each point."""
-        index, xyz = self.behind(thinned)
-        normals = np.repeat(self.surface.normals[thinned], self._n_behind(thinned), axis=0)
+    def full_resolution_with_normals(self, downsampled: Indices) -> tuple[Indices, Array, Array]:
+        """What `behind` tells, and the normals of the downsampled points, one for each point."""
+        index, xyz = self.full_resolution(downsampled)
+        normals = np.repeat(self.surface.normals[downsampled], self._n_behind(downsampled), axis=0)
         return index, xyz, normals
 
-    def _n_behind(self, thinned: Indices) -> Indices:
-        return np.asarray(self._starts[thinned + 1] - self._starts[thinned], np.intp)
+    def _n_behind(self, downsampled: Indices) -> Indices:
+        return np.asarray(self._starts[downsampled + 1] - self._starts[downsampled], np.intp)

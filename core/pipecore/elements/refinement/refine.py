@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from pipecore._kernels.extent import points_between
 from pipecore._kernels.misfit import look_at_sphere
-from pipecore.elements.proposals import Piece, arc_direction
+from pipecore.elements.proposals import Proposal, arc_direction
 from pipecore.elements.refinement.extent import (
     MAX_SECTORS,
     Extent,
     find_extent,
     section_misfit,
 )
-from pipecore.elements.refinement.nearby_points import NearbyPoints, PointsOn
+from pipecore.elements.refinement.nearby_points import NearbyPoints, PointsOnSurface
 from pipecore.elements.refinement.raised_bands import is_off_bands
 from pipecore.elements.refinement.section_model import (
     MAX_HEIGHT,
@@ -74,7 +74,7 @@ still to come, or whose last two are."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class FittedElement:
     """A piece fitted to the cloud.
 
     Parameters
@@ -82,8 +82,8 @@ class Fitted:
     fit : SurfaceFit
     axis : LineAxis or ArcAxis
         As scanned, from where the points start to where they end.
-    own : ndarray of int
-        Thinned points on the surface.
+    inliers : ndarray of int
+        Downsampled points on the surface.
     extent : Extent
         Along `axis`.
     misfit : float
@@ -92,7 +92,7 @@ class Fitted:
 
     fit: SurfaceFit[LineSurface] | SurfaceFit[ArcSurface] | SurfaceFit[SphereSurface]
     axis: LineAxis | ArcAxis
-    own: Indices
+    inliers: Indices
     extent: Extent
     misfit: float
     section: SectionModel | None = None
@@ -106,7 +106,7 @@ class Fitted:
         measurements of the radius as there are sectors; metres.
         """
         n_sectors = max(self.extent.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
-        by_noise = 0.5 * np.pi * self.fit.sigma**2 * n_sectors / max(len(self.own), 1)
+        by_noise = 0.5 * np.pi * self.fit.sigma**2 * n_sectors / max(len(self.inliers), 1)
         excess = max(self.misfit**2 - by_noise, 0.0)
         factor = float(radius_sd_factor(self.extent.arc))
         return float(np.hypot(self.fit.radius_sd, factor * np.sqrt(excess / n_sectors)))
@@ -120,23 +120,23 @@ class Fitted:
         return model.radius_at(self.axis.start), model.radius_at(self.axis.end)
 
 
-def refine_piece(
-    piece: Piece,
+def refine_proposal(
+    piece: Proposal,
     nearby: NearbyPoints,
     is_free: Flags,
-    is_promising: Callable[[Fitted, float], bool] = lambda fitted, slack: True,
+    is_promising: Callable[[FittedElement, float], bool] = lambda fitted, slack: True,
     used: list[Indices] | None = None,
-) -> Fitted | None:
+) -> FittedElement | None:
     """Fit a piece's surface to the cloud's points and find how far it reaches.
 
     Fit and extent improve each other in a few rounds.
 
     Parameters
     ----------
-    piece : Piece
+    piece : Proposal
     nearby : NearbyPoints
     is_free : ndarray of bool
-        Thinned points that no other element has taken.
+        Downsampled points that no other element has taken.
     is_promising : callable
         Asked, with a slack for the limits of what later rounds can mend, before the last
         round, which alone uses all points: most pieces end there. Of spheres already after
@@ -146,7 +146,7 @@ def refine_piece(
 
     Returns
     -------
-    Fitted or None
+    FittedElement or None
         None where the points do not carry the surface.
     """
     used = [] if used is None else used
@@ -158,7 +158,7 @@ def refine_piece(
         axis_between(model, piece.low, piece.high),
         max(nearby.surface.noise, 0.001, 0.01 * model.radius),
     )
-    fitted: Fitted | None = None
+    fitted: FittedElement | None = None
     for round_ in range(N_ROUNDS - 1):
         rough = _refine_roughly(guess, round_, nearby, is_free, used)
         if rough is None:
@@ -191,9 +191,9 @@ class _Guess:
 class _Look:
     """The points on a guessed surface, how far they reach, and those that a fit takes."""
 
-    near: PointsOn
+    near: PointsOnSurface
     extent: Extent
-    own: Indices
+    inliers: Indices
     chosen: Indices
     misfit: float
 
@@ -208,7 +208,7 @@ def _look_at(
         band=_band(sigma) + (section.max_height if section else 0.0),
         depth=INSIDE * model.radius, min_cos=RADIAL_COS, is_rough=round_ < N_ROUNDS - 1,
     )  # fmt: skip
-    used.append(near.own)
+    used.append(near.inliers)
     if section is not None:
         near = near.about(section, _band(sigma))
     extent = find_extent(
@@ -220,7 +220,7 @@ def _look_at(
     # Near the ends other surfaces begin, so the fit stays clear of them.
     clear = min(0.3 * model.radius, 0.1 * (extent.high - extent.low))
     own, own_clock, own_residual, chosen = points_between(
-        near.own, near.chainage, near.clock, near.residual,
+        near.inliers, near.chainage, near.clock, near.residual,
         extent.low, extent.high, clear, LEAST_CLEAR,
     )  # fmt: skip
     misfit = section_misfit(own_clock, own_residual, extent.arc)
@@ -229,8 +229,8 @@ def _look_at(
 
 def _refine_roughly(
     guess: _Guess, round_: int, nearby: NearbyPoints, is_free: Flags, used: list[Indices]
-) -> tuple[_Guess, Fitted | None] | None:
-    """A round on thinned points: the next guess, and the piece as it is now; None without one."""
+) -> tuple[_Guess, FittedElement | None] | None:
+    """One round on downsampled points: the next guess, and the element as fitted so far."""
     look = _look_at(guess, round_, nearby, is_free, used)
     if look is None:
         # A section may be so far from round that the circle runs along its points nowhere.
@@ -242,7 +242,7 @@ def _refine_roughly(
     )
     if fit is None:
         return None
-    fitted = Fitted(fit, guess.axis, look.own, look.extent, look.misfit, guess.section)
+    fitted = FittedElement(fit, guess.axis, look.inliers, look.extent, look.misfit, guess.section)
     following = guess.after(fit, look.extent.low, look.extent.high)
     rough = max(ROUGH_NOISE * nearby.surface.noise, ROUGH_SHARE * fit.model.radius)
     if guess.section is None and following.sigma <= rough:
@@ -251,25 +251,27 @@ def _refine_roughly(
     if oval is None:
         return following, fitted
     following, fit = oval
-    return following, Fitted(fit, following.axis, look.own, look.extent, 0.0, following.section)
+    section = following.section
+    fitted = FittedElement(fit, following.axis, look.inliers, look.extent, 0.0, section)
+    return following, fitted
 
 
 def _refine_finally(
     guess: _Guess,
-    fitted: Fitted,
+    fitted: FittedElement,
     nearby: NearbyPoints,
     is_free: Flags,
-    is_promising: Callable[[Fitted, float], bool],
+    is_promising: Callable[[FittedElement, float], bool],
     used: list[Indices],
-) -> Fitted | None:
+) -> FittedElement | None:
     """The last round, on all points; `fitted` is how the piece was before."""
     look = _look_at(guess, N_ROUNDS - 1, nearby, is_free, used)
     if look is None:
         return None
     told = partial(
-        Fitted,
+        FittedElement,
         axis=guess.axis,
-        own=look.own,
+        inliers=look.inliers,
         extent=look.extent,
         misfit=look.misfit,
         section=guess.section,
@@ -302,7 +304,7 @@ def _fit_oval(
         model, guess.axis, 0.0, is_free, band=OVAL_BAND * model.radius,
         depth=INSIDE * model.radius, min_cos=RADIAL_COS, is_rough=True,
     )  # fmt: skip
-    used.append(near.own)
+    used.append(near.inliers)
     found = fit_section_model(near.chainage, near.clock, near.residual, model.radius, arc)
     if found is None:
         return None
@@ -311,7 +313,7 @@ def _fit_oval(
     section = found.without_pose()
     if after > CLEARLY_BETTER * before or section.max_height > MAX_HEIGHT * model.radius:
         return None
-    on = near.own[np.abs(left) <= _band(after)]
+    on = near.inliers[np.abs(left) <= _band(after)]
     fit = _fit_roughly(model, on, nearby, 3.0 * after, _flattened(guess.axis, section))
     if fit is None:
         return None
@@ -334,15 +336,15 @@ def _flattened(
     return flatten
 
 
-def _placed(fitted: Fitted, axis: LineAxis | ArcAxis) -> Fitted:
+def _placed(fitted: FittedElement, axis: LineAxis | ArcAxis) -> FittedElement:
     """The fitted piece with the axis of its last fit, its extent counted from the axis's start."""
     old = fitted.extent
     gaps = tuple((a - old.low, b - old.low) for a, b in old.gaps)
     extent = Extent(0.0, axis.length, old.arc, old.coverage, gaps)
-    return Fitted(
+    return FittedElement(
         fitted.fit,
         axis,
-        fitted.own,
+        fitted.inliers,
         extent,
         fitted.misfit,
         fitted.section.from_chainage(old.low) if fitted.section else None,
@@ -383,23 +385,23 @@ def _band(sigma: float) -> float:
 
 def _fit_roughly(
     model: AnySurface,
-    thinned: Indices,
+    downsampled: Indices,
     nearby: NearbyPoints,
     scale: float,
     flatten: Callable[[Array], Array] | None = None,
 ) -> SurfaceFit[Any] | None:
-    """Fit the model to thinned points."""
-    if len(thinned) < LEAST_POINTS:
+    """Fit the model to downsampled points."""
+    if len(downsampled) < LEAST_POINTS:
         return None
-    points = nearby.surface.xyz[sample_evenly(thinned, MAX_ROUGH_POINTS)]
+    points = nearby.surface.xyz[sample_evenly(downsampled, MAX_ROUGH_POINTS)]
     if flatten is not None:
         points = flatten(points)
-    return _fit_sample(model, points, scale, min(len(thinned), SURE_POINTS))
+    return _fit_sample(model, points, scale, min(len(downsampled), SURE_POINTS))
 
 
 def _holds(
-    is_promising: Callable[[Fitted, float], bool],
-    told: Callable[[SurfaceFit[Any]], Fitted],
+    is_promising: Callable[[FittedElement, float], bool],
+    told: Callable[[SurfaceFit[Any]], FittedElement],
     fit: SurfaceFit[Any],
 ) -> bool:
     """Whether a piece is promising with the fit of a sample."""
@@ -423,7 +425,7 @@ def _is_still(fit: SurfaceFit[Any], model: AnySurface) -> bool:
 
 def fit_measured(
     model: AnySurface,
-    thinned: Indices,
+    downsampled: Indices,
     nearby: NearbyPoints,
     scale: float,
     spacing: float,
@@ -436,13 +438,13 @@ def fit_measured(
     ----------
     model : LineSurface, ArcSurface or SphereSurface
         Where to start.
-    thinned : ndarray of int
-        Thinned points on the surface.
+    downsampled : ndarray of int
+        Downsampled points on the surface.
     nearby : NearbyPoints
     scale : float
         Distance from the surface up to which points count in full, metres.
     spacing : float
-        Distance between neighbouring thinned points, metres.
+        Distance between neighbouring downsampled points, metres.
     holds : callable
         Asked of the fit to a sample of many points, from which that to all begins.
 
@@ -451,9 +453,9 @@ def fit_measured(
     SurfaceFit or None
         None where the points do not carry the surface, or carry quite another one.
     """
-    if len(thinned) < LEAST_POINTS:
+    if len(downsampled) < LEAST_POINTS:
         return None
-    _, points = nearby.behind(thinned)
+    _, points = nearby.full_resolution(downsampled)
     points = sample_evenly(points, MAX_FIT_POINTS)
     if flatten is not None:
         points = flatten(points)
@@ -461,18 +463,18 @@ def fit_measured(
     if len(points) > MANY_POINTS:
         sampled = _fit_sample(model, sample_evenly(points, SURE_POINTS), scale, len(points))
         if sampled is None or not (
-            holds(sampled) or _off_bands(sampled, thinned, nearby, spacing) is not None
+            holds(sampled) or _off_bands(sampled, downsampled, nearby, spacing) is not None
         ):
             return None
         start, scale = sampled.model, AGAIN * sampled.sigma
     fit = fit_surface(start, points, scale)
     if fit is None or not _is_still(fit, model):
         return None
-    own = _off_bands(fit, thinned, nearby, spacing) if flatten is None else None
+    own = _off_bands(fit, downsampled, nearby, spacing) if flatten is None else None
     if own is None:
         return fit
     if len(own) >= LEAST_POINTS:
-        _, points = nearby.behind(own)
+        _, points = nearby.full_resolution(own)
         fit = fit_surface(fit.model, sample_evenly(points, MAX_FIT_POINTS), 3.0 * fit.sigma)
         if fit is not None and _is_still(fit, model):
             return fit
@@ -480,30 +482,30 @@ def fit_measured(
 
 
 def _off_bands(
-    fit: SurfaceFit[Any], thinned: Indices, nearby: NearbyPoints, spacing: float
+    fit: SurfaceFit[Any], downsampled: Indices, nearby: NearbyPoints, spacing: float
 ) -> Indices | None:
     """The points that are not of bands around a pipe; None where there are none of those."""
     model = fit.model
     if not isinstance(model, LineSurface):
         return None
-    xyz = nearby.surface.xyz[thinned]
+    xyz = nearby.surface.xyz[downsampled]
     chainage = (xyz - model.middle) @ model.direction
     residual, _, outward = model.residuals(xyz)
     is_own = is_off_bands(chainage, residual, spacing, model.radius)
     if is_own is None:
         return None
     # Where a band or a rib meets the pipe, the normals turn away before the points do.
-    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[thinned], outward))
-    return np.asarray(thinned[is_own & (cosine > CLEAR_COS)], np.intp)
+    cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[downsampled], outward))
+    return np.asarray(downsampled[is_own & (cosine > CLEAR_COS)], np.intp)
 
 
 def _refine_sphere(
     model: SphereSurface,
     nearby: NearbyPoints,
     is_free: Flags,
-    is_promising: Callable[[Fitted, float], bool],
+    is_promising: Callable[[FittedElement, float], bool],
     used: list[Indices],
-) -> Fitted | None:
+) -> FittedElement | None:
     sigma = max(nearby.surface.noise, 0.001, 0.01 * model.radius)
     fitted = None
     for round_ in range(N_ROUNDS):
@@ -528,10 +530,12 @@ def _refine_sphere(
     return fitted
 
 
-def _fitted_sphere(fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints) -> Fitted:
+def _fitted_sphere(
+    fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints
+) -> FittedElement:
     model, upright = fit.model, np.array([0.0, 0.0, 1.0])
     misfit, low, high, arc = look_at_sphere(
         nearby.surface.xyz, own, model.centre, model.radius, MAX_SECTORS, *PATCHES
     )
     axis = LineAxis(model.centre + low * upright, upright, high - low)
-    return Fitted(fit, axis, own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)
+    return FittedElement(fit, axis, own, Extent(0.0, axis.length, arc, 1.0, ()), misfit)

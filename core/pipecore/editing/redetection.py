@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.editing.changes import find, noted, with_settings, without
-from pipecore.editing.measuring import in_box, part_of, points_near
+from pipecore.editing.refitting import in_box, part_of, points_near
 from pipecore.errors import EditError
 from pipecore.pipeline import detect
 from pipecore.progress import NoProgress, Progress

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipecore.elements.gates.acceptance import WAVINESS, failed_gate, is_credible
+from pipecore.elements.gates.acceptance import WAVINESS, failed_gate, passes_gates
 from pipecore.elements.gates.waviness import waviness
 from pipecore.elements.refinement.extent import Extent
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,
@@ -42,7 +42,7 @@ def pipe(rng):
     model = LineSurface(axis.at(axis.length / 2), axis.direction, radius)
     extent = Extent(0.0, axis.length, np.pi, 1.0, ())
     own = np.arange(len(surface.xyz))
-    return Fitted(with_sd(model, 0.001 * radius), axis, own, extent, 0.0), surface
+    return FittedElement(with_sd(model, 0.001 * radius), axis, own, extent, 0.0), surface
 
 
 def gate_of(pipe, settings=SETTINGS, **changes):
@@ -52,22 +52,22 @@ def gate_of(pipe, settings=SETTINGS, **changes):
 
 def test_that_a_sound_pipe_passes_all_gates(pipe):
     assert gate_of(pipe) is None
-    assert is_credible(*pipe, SETTINGS)
+    assert passes_gates(*pipe, SETTINGS)
 
 
 def test_that_each_fault_of_a_pipe_is_told_by_its_gate(pipe):
     found, _ = pipe
     radius, fit, extent = found.fit.model.radius, found.fit, found.extent
     only = replace(SETTINGS, max_radius_mm=0.9e3 * radius)
-    assert gate_of(pipe, only) == "has_a_wanted_size"
-    assert gate_of(pipe, fit=replace(fit, sigma=0.01)) == "lies_on_its_points"
+    assert gate_of(pipe, only) == "radius_is_within_limits"
+    assert gate_of(pipe, fit=replace(fit, sigma=0.01)) == "scatter_is_low"
     unsure = with_sd(fit.model, 0.05 * radius)
-    assert gate_of(pipe, fit=unsure) == "has_a_known_radius"
+    assert gate_of(pipe, fit=unsure) == "radius_is_well_determined"
     assert gate_of(pipe, misfit=0.03 * radius) == "is_round"
-    assert gate_of(pipe, extent=replace(extent, coverage=0.4)) == "is_covered"
+    assert gate_of(pipe, extent=replace(extent, coverage=0.4)) == "axis_is_covered"
     short_arc = replace(extent, arc=np.deg2rad(50))
     vague = with_sd(fit.model, 0.008 * radius)
-    assert gate_of(pipe, fit=vague, extent=short_arc) == "shows_enough_arc"
+    assert gate_of(pipe, fit=vague, extent=short_arc) == "arc_is_wide_enough"
     assert gate_of(pipe, extent=short_arc) is None
 
 
@@ -77,7 +77,7 @@ def test_that_a_short_arc_must_carry_its_radius_the_more_the_shorter_the_pipe(pi
     rough = with_sd(found.fit.model, 0.02 * found.fit.model.radius)
     assert gate_of(pipe, fit=rough, extent=arc) is None
     stub = replace(found.axis, length=2 * found.fit.model.radius)
-    assert gate_of(pipe, fit=rough, extent=arc, axis=stub) == "is_sharp_for_its_arc"
+    assert gate_of(pipe, fit=rough, extent=arc, axis=stub) == "radius_is_precise_for_its_arc"
     assert gate_of(pipe, fit=rough, axis=stub) is None
 
 
@@ -95,13 +95,13 @@ def test_that_a_bend_needs_a_hole_and_a_known_bend_radius(pipe):
     normal = np.array([0.0, 0.0, 1.0])
     for bend_radius, sd, gate in (
         (3 * radius, 0.1 * radius, None),
-        (3 * radius, 1.5 * radius, "has_a_known_bend_radius"),
-        (1.01 * radius, 0.01 * radius, "leaves_a_hole"),
+        (3 * radius, 1.5 * radius, "bend_radius_is_well_determined"),
+        (1.01 * radius, 0.01 * radius, "bend_radius_exceeds_radius"),
     ):
         model = ArcSurface(found.axis.start, normal, bend_radius, radius)
         axis = model.axis_from(np.array([1.0, 0.0, 0.0]), np.pi / 2)
         fit = with_sd(model, 0.001 * radius, sd)
-        piece = replace(found, fit=fit, axis=axis, own=np.arange(0))
+        piece = replace(found, fit=fit, axis=axis, inliers=np.arange(0))
         assert failed_gate(piece, surface, SETTINGS) == gate
 
 
@@ -109,9 +109,9 @@ def test_that_a_slice_of_a_vessels_head_is_no_pipe(pipe):
     found, surface = pipe
     model = replace(found.fit.model, radius=0.5)
     fit = with_sd(model, 0.0005)
-    for lengths, gate in ((0.3, "is_longer_than_a_slice"), (0.9, None)):
+    for lengths, gate in ((0.3, "cylinder_is_long_enough"), (0.9, None)):
         piece = replace(
-            found, fit=fit, axis=replace(found.axis, length=lengths * 0.5), own=np.arange(0)
+            found, fit=fit, axis=replace(found.axis, length=lengths * 0.5), inliers=np.arange(0)
         )
         assert failed_gate(piece, surface, SETTINGS) == gate
 
@@ -121,12 +121,12 @@ def test_that_a_sphere_is_one_all_over(rng):
     model = SphereSurface(np.zeros(3), 0.3)
     axis = LineAxis(np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 1.0]), 0.6)
     own = np.arange(len(surface.xyz))
-    whole = Fitted(with_sd(model, 0.0003), axis, own, Extent(0, 0.6, FULL, 1.0, ()), 0.0)
+    whole = FittedElement(with_sd(model, 0.0003), axis, own, Extent(0, 0.6, FULL, 1.0, ()), 0.0)
     assert failed_gate(whole, surface, SETTINGS) is None
-    few = replace(whole, own=own[:30])
-    assert failed_gate(few, surface, SETTINGS) == "has_many_points"
+    few = replace(whole, inliers=own[:30])
+    assert failed_gate(few, surface, SETTINGS) == "has_enough_points"
     flat = replace(whole, misfit=0.002)
-    assert failed_gate(flat, surface, SETTINGS) == "is_a_ball_all_over"
+    assert failed_gate(flat, surface, SETTINGS) == "sphere_fits_everywhere"
 
 
 def seen(rng, radius, length, arc, shape, noise=0.002, spacing=0.01):

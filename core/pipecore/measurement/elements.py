@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from pipecore.allocation import Allocate, in_memory
 from pipecore.deformation import curvature_variations, find_deformations
-from pipecore.elements import BuiltElements, NearbyPoints
-from pipecore.elements.sections import cut_normal_stack
+from pipecore.elements import NearbyPoints
+from pipecore.measurement.adjacency import bounding_boxes, neighbours_of
+from pipecore.measurement.sections import cut_normal_stack
 from pipecore.parallel import for_items
 from pipecore.progress import Progress
 from pipecore.settings import DeformationSettings, EllipseFit
@@ -19,13 +20,10 @@ from pipecore.types import NO_ID, Deformation, Element, Profiles
 
 Array = NDArray[np.float64]
 
-N_SAMPLES = 16
-"""Places along an axis at which its neighbours are looked for."""
-
 
 @dataclass(frozen=True, eq=False)
-class Measurement:
-    """What the cloud's points tell of the elements.
+class MeasuredElements:
+    """Elements measured at full resolution.
 
     Parameters
     ----------
@@ -47,34 +45,71 @@ class Measurement:
     deviation: NDArray[np.float32]
 
 
+@dataclass(frozen=True)
+class MeasuringOptions:
+    """How elements are measured.
+
+    Parameters
+    ----------
+    profile_width : float
+        Least width of the profiles of normal stacks, metres.
+    deformations : DeformationSettings
+    fit : EllipseFit
+        How free ellipses are fitted.
+    """
+
+    profile_width: float
+    deformations: DeformationSettings
+    fit: EllipseFit
+
+
 def measure_elements(
-    built: BuiltElements,
+    elements: Sequence[Element],
     nearby: NearbyPoints,
     n_points: int,
-    width: float,
-    settings: DeformationSettings,
-    fit: EllipseFit,
+    options: MeasuringOptions,
     progress: Progress,
-    others: tuple[Element, ...] = (),
+    others: Sequence[Element] = (),
     allocate: Allocate = in_memory,
-) -> Measurement:
-    """Measure every element on all points around it.
+) -> MeasuredElements:
+    """Measure every element on all points of the cloud around it.
 
-    `others` are not measured, but what touches an element there is no deformation of it.
-    `allocate` makes the arrays with a value for each point of the cloud.
+    Parameters
+    ----------
+    elements : sequence of Element
+    nearby : NearbyPoints
+        Of the cloud.
+    n_points : int
+        Number of points of the cloud.
+    options : MeasuringOptions
+    progress : Progress
+        Receives fractions of the stage "deformations".
+    others : sequence of Element
+        Elements that are not measured; where they touch one there is no deformation of it.
+    allocate : callable
+        Makes the arrays with a value for each point of the cloud.
+
+    Returns
+    -------
+    MeasuredElements
+
+    Raises
+    ------
+    CancelledError
+        From `progress`.
     """
-    everything = built.elements + others
+    everything = (*elements, *others)
     boxes = bounding_boxes(everything)
     element_id, deviation = _of_no_element(n_points, allocate)
-    measured: dict[int, _Measured] = {}
+    measured: dict[int, _MeasuredElement] = {}
     # The largest first: at the end of one that is begun late the other threads would wait.
-    order = sorted(range(len(built.elements)), key=lambda i: -_size(built.elements[i]))
+    order = sorted(range(len(elements)), key=lambda i: -_size(elements[i]))
     assigning = Lock()
 
     def work(k: int, check: Callable[[], None]) -> None:
-        element = built.elements[order[k]]
+        element = elements[order[k]]
         neighbours = neighbours_of(element, everything, boxes)
-        found = _measure(element, neighbours, nearby, width, settings, fit, check)
+        found = _measure(element, neighbours, nearby, options, check)
         with assigning:
             _assign(found, element_id, deviation)
             measured[order[k]] = replace(found, index=_NONE, deviation=_NONE)
@@ -82,7 +117,7 @@ def measure_elements(
     for_items(work, len(order), "deformations", progress)
     in_order = [measured[i] for i in range(len(order))]
     progress.update("deformations", 1.0)
-    return Measurement(
+    return MeasuredElements(
         tuple(m.element for m in in_order),
         Profiles.concatenate([m.profiles for m in in_order]),
         tuple(d for m in in_order for d in m.deformations),
@@ -103,7 +138,7 @@ def _of_no_element(
 
 
 @dataclass(frozen=True, eq=False)
-class _Measured:
+class _MeasuredElement:
     """One element with what was measured of it; its points with their deviations."""
 
     element: Element
@@ -120,21 +155,19 @@ def _measure(
     element: Element,
     neighbours: list[Element],
     nearby: NearbyPoints,
-    width: float,
-    settings: DeformationSettings,
-    fit: EllipseFit,
+    options: MeasuringOptions,
     check: Callable[[], None],
-) -> _Measured:
+) -> _MeasuredElement:
     radius = max(element.radius, element.radius_end)
-    thinned = nearby.thinned(element.axis, radius, 0.5 * radius)
-    index, xyz, normals = nearby.of_cloud(thinned)
-    finding = find_deformations(element, xyz, normals, neighbours, settings)
+    downsampled = nearby.around_axis(element.axis, radius, 0.5 * radius)
+    index, xyz, normals = nearby.full_resolution_with_normals(downsampled)
+    finding = find_deformations(element, xyz, normals, neighbours, options.deformations)
     check()
     own = finding.points[finding.belongs]
     places = own.chainage, own.distance, own.clock
-    spacing = nearby.usual_spacing(thinned)
-    section_width = max(width, 0.1 * element.radius, 2.5 * spacing)
-    rows = cut_normal_stack(element, places, section_width, spacing, fit, check)
+    spacing = nearby.usual_spacing(downsampled)
+    section_width = max(options.profile_width, 0.1 * element.radius, 2.5 * spacing)
+    rows = cut_normal_stack(element, places, section_width, spacing, options.fit, check)
     variation = curvature_variations(element, places, rows, section_width, check)
     rows = replace(rows, curvature_variation=variation)
     complete = replace(
@@ -147,7 +180,7 @@ def _measure(
         straightness=finding.straightness,
         not_measurable=finding.not_measurable,
     )
-    return _Measured(
+    return _MeasuredElement(
         complete,
         rows,
         finding.deformations,
@@ -157,7 +190,7 @@ def _measure(
 
 
 def _assign(
-    found: _Measured, element_id: NDArray[np.int32], deviation: NDArray[np.float32]
+    found: _MeasuredElement, element_id: NDArray[np.int32], deviation: NDArray[np.float32]
 ) -> None:
     """Give an element its points: where elements meet, a point is of the one it fits better.
 
@@ -175,41 +208,3 @@ def _assign(
 def _size(element: Element) -> float:
     """About how many points an element has beside others: the area of its surface."""
     return element.axis.length * max(element.radius, element.radius_end)
-
-
-def bounding_boxes(elements: Sequence[Element]) -> tuple[Array, Array, Array]:
-    """Lowest and highest coordinates of the elements' axes, each (n, 3), and their radii (n,)."""
-    low, high = np.empty((2, len(elements), 3))
-    for i, element in enumerate(elements):
-        samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
-        # Between its samples an arc leaves their box by less than half a step.
-        half_step = 0.5 * element.axis.length / (N_SAMPLES - 1)
-        low[i], high[i] = samples.min(axis=0) - half_step, samples.max(axis=0) + half_step
-    return low, high, np.array([max(e.radius, e.radius_end) for e in elements])
-
-
-def neighbours_of(
-    element: Element, elements: Sequence[Element], boxes: tuple[Array, Array, Array]
-) -> list[Element]:
-    """Elements whose surfaces may come near: their axis passes within reach of its own.
-
-    `boxes` are those of the elements' axes and their radii; most are far off by them alone.
-    """
-    samples = element.axis.at(np.linspace(0.0, element.axis.length, N_SAMPLES))
-    step = element.axis.length / (N_SAMPLES - 1)
-    radius = max(element.radius, element.radius_end)
-    low, high, radii = boxes
-    # Within reach of an end along the axis, and of the axis across it.
-    furthest = (2.0 * (1.2 * (radius + radii) + step))[:, None]
-    apart = (low - furthest > samples.max(axis=0)) | (high + furthest < samples.min(axis=0))
-    near = []
-    for i in np.flatnonzero(~apart.any(axis=1)).tolist():
-        other = elements[i]
-        if other is element:
-            continue
-        chainage, rho, _ = other.axis.pipe_coordinates(samples)
-        reach = 1.2 * (radius + radii[i]) + step
-        beside = (rho < reach) & (chainage > -reach) & (chainage < other.axis.length + reach)
-        if beside.any():
-            near.append(other)
-    return near

@@ -1,6 +1,6 @@
-"""A cloud larger than memory: its points in files, looked at tile by tile."""
+"""A cloud larger than memory: its points in files, visited tile by tile."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,11 @@ from pipecore.allocation import Allocate
 from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.surface import Surface
-from pipecore.tiling.curves import cut_in_batches, leave_out_planes, local_axes_in_slabs
+from pipecore.tiling.curves import cut_in_batches, local_axes_in_slabs, remove_planes
 from pipecore.tiling.engine import Engine
-from pipecore.tiling.thinning import TiledSurface, thin_in_slabs
+from pipecore.tiling.slabs import TiledSurface, downsample_in_slabs
 from pipecore.types import PointCloud, Stack
-from pipecore.workspace import Cut, JoinPlanes, Uneven
+from pipecore.workspace import Cut, PlaneLabels, with_spans
 
 
 class InTiles:
@@ -39,7 +39,7 @@ class InTiles:
 
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
         """See `Workspace`."""
-        self._tiled = thin_in_slabs(
+        self._tiled = downsample_in_slabs(
             self._engine, len(self.cloud), settings, self._slab_bytes, progress
         )
         return self._tiled.surface
@@ -48,26 +48,20 @@ class InTiles:
         """See `Workspace`."""
         return local_axes_in_slabs(self._engine, self._known(), progress)
 
-    def leave_out_planes(
-        self, surface: Surface, join: JoinPlanes, settings: Settings, progress: Progress
-    ) -> Uneven:
+    def remove_planes(
+        self, surface: Surface, max_radius: float, progress: Progress
+    ) -> Iterator[PlaneLabels]:
         """See `Workspace`."""
-        max_radius = settings.elements.max_radius_mm / 1e3
-        leave_out_planes(self._engine, self._known(), join, max_radius, progress)
-        return Uneven(surface, np.empty(0, np.int32))
+        return remove_planes(self._engine, self._known(), max_radius, progress)
 
-    def cut(
-        self,
-        uneven: Uneven,
-        stack: Stack,
-        settings: Settings,
-        progress: Progress,
-        span: tuple[float, float],
+    def cut_stacks(
+        self, stacks: Sequence[Stack], settings: Settings, progress: Progress
     ) -> Iterator[Cut]:
         """See `Workspace`."""
-        return cut_in_batches(
-            self._engine, self._known(), stack, settings, self._batch_bytes, progress, span
-        )
+        for stack, span in with_spans(stacks):
+            yield from cut_in_batches(
+                self._engine, self._known(), stack, settings, self._batch_bytes, progress, span
+            )
 
     def _known(self) -> TiledSurface:
         assert self._tiled is not None, "the surface has not been sampled"

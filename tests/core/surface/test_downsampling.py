@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from pipecore.geometry import LineAxis
 from pipecore.progress import NoProgress
 from pipecore.settings import ThinningSettings
-from pipecore.surface import median_spacing, thin
+from pipecore.surface import downsample, median_spacing
 from pipecore.surface.spacing import sample_by_place
 from pipecore.types import PointCloud
 from tests.core.shapes import cloud_of, parents, plane, random_direction, tube
@@ -29,10 +29,12 @@ def test_that_shuffled_points_thin_to_the_same_bits(rng, dtype, voxel_mm):
     # The automatic voxel comes from a sample of the points, so it is fixed here.
     settings = ThinningSettings(voxel_mm or 1e3 * median_spacing(cloud.xyz))
     shuffled = rng.permutation(len(cloud))
-    once = thin(cloud, settings, NoProgress())
-    again = thin(replace(cloud, xyz=cloud.xyz[shuffled]), settings, NoProgress())
+    once = downsample(cloud, settings, NoProgress())
+    again = downsample(replace(cloud, xyz=cloud.xyz[shuffled]), settings, NoProgress())
     assert_array_equal(again.xyz, once.xyz)
-    assert_array_equal(parents(again.behind), parents(once.behind)[shuffled])
+    assert_array_equal(
+        parents(again.full_resolution_points), parents(once.full_resolution_points)[shuffled]
+    )
 
 
 def test_that_the_automatic_voxel_does_not_depend_on_the_order_of_the_points(rng):
@@ -43,21 +45,21 @@ def test_that_the_automatic_voxel_does_not_depend_on_the_order_of_the_points(rng
 
 def test_that_a_thinned_point_is_the_mean_of_the_points_that_name_it(rng):
     cloud = cloud_of(pipe(rng))
-    thinned = thin(cloud, ThinningSettings(20.0), NoProgress())
-    assert len(thinned.xyz) < len(cloud) / 4
-    parent = parents(thinned.behind)
-    assert set(parent) == set(range(len(thinned.xyz)))
-    for k in rng.choice(len(thinned.xyz), 50):
+    downsampled = downsample(cloud, ThinningSettings(20.0), NoProgress())
+    assert len(downsampled.xyz) < len(cloud) / 4
+    parent = parents(downsampled.full_resolution_points)
+    assert set(parent) == set(range(len(downsampled.xyz)))
+    for k in rng.choice(len(downsampled.xyz), 50):
         members = cloud.xyz[parent == k]
-        assert_allclose(thinned.xyz[k], members.mean(axis=0), atol=1e-6)
+        assert_allclose(downsampled.xyz[k], members.mean(axis=0), atol=1e-6)
         assert np.ptp(members, axis=0).max() <= 0.02 + 1e-12
 
 
 def test_that_far_coordinates_cost_no_more_than_a_micrometre(rng):
     xyz = np.round(cloud_of(pipe(rng)).xyz, 6)
     shift = np.array([320.0, -640.0, 64.0])
-    near = thin(PointCloud(np.zeros(3), xyz), ThinningSettings(10.0), NoProgress())
-    far = thin(PointCloud(np.zeros(3), xyz + shift), ThinningSettings(10.0), NoProgress())
+    near = downsample(PointCloud(np.zeros(3), xyz), ThinningSettings(10.0), NoProgress())
+    far = downsample(PointCloud(np.zeros(3), xyz + shift), ThinningSettings(10.0), NoProgress())
     # Cubes count from the local zero and the shift is whole cubes, so that the same points
     # share one, but for those that rounding takes across a side.
     off, _ = cKDTree(near.xyz).query(far.xyz - shift)
@@ -68,14 +70,14 @@ def test_that_the_automatic_voxel_is_the_spacing_of_the_scan(rng):
     for spacing in (0.005, 0.01, 0.02):
         sheet = plane(rng, np.zeros(3), [100 * spacing, 0, 0], [0, 100 * spacing, 0], spacing)
         assert median_spacing(sheet[0]) == pytest.approx(spacing, rel=0.12)
-        assert thin(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == median_spacing(
-            sheet[0]
-        )
+        assert downsample(
+            cloud_of(sheet), ThinningSettings(), NoProgress()
+        ).voxel == median_spacing(sheet[0])
 
 
 def test_that_scans_are_not_thinned_below_their_noise(rng):
     sheet = plane(rng, np.zeros(3), [0.1, 0, 0], [0, 0.1, 0], 0.001)
-    assert thin(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == 0.003
+    assert downsample(cloud_of(sheet), ThinningSettings(), NoProgress()).voxel == 0.003
 
 
 @pytest.mark.parametrize("case", ["pipe", "far outlier", "doubled", "few", "thick"])

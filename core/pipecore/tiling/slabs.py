@@ -1,6 +1,6 @@
-"""The surface of a cloud in files: thinned slab by slab, with normals from overlapping slabs.
+"""The surface of a cloud in files: downsampled slab by slab, with normals from overlapping slabs.
 
-A slab holds whole planes of voxels across the x axis, so that the thinned points of all
+A slab holds whole planes of voxels across the x axis, so that the downsampled points of all
 slabs in a row are in the order in which the whole cloud's would be.
 """
 
@@ -34,7 +34,7 @@ Rows = tuple[int, int]
 PART = 1_000_000
 """Points that are looked at together before they are sorted into slabs."""
 BYTES_PER_POINT = 260
-"""What thinning a point or fitting a plane to a thinned point takes at the most."""
+"""What thinning a point or fitting a plane to a downsampled point takes at the most."""
 MARGIN = int(np.ceil(WIDEST_NEIGHBOURHOOD)) + 1
 """Planes on either side of a slab that its normals need."""
 
@@ -48,7 +48,7 @@ class Slab:
     first, last : int
         The planes, both included.
     points, surface : (int, int)
-        Rows of the cloud's points sorted by voxel, and of the thinned points.
+        Rows of the cloud's points sorted by voxel, and of the downsampled points.
     """
 
     first: int
@@ -59,7 +59,7 @@ class Slab:
 
 @dataclass(frozen=True, eq=False)
 class TiledSurface:
-    """A thinned cloud in a store, slab by slab.
+    """A downsampled cloud in a store, slab by slab.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ class TiledSurface:
         With arrays in files; its `parent` is empty, see `members`.
     slabs : tuple of Slab
     planes, plane_starts : ndarray of int64
-        The planes that hold thinned points, and the first of each; one more at the end.
+        The planes that hold downsampled points, and the first of each; one more at the end.
     n_usable : ndarray of int64
-        Thinned points with a normal, of each slab.
+        Downsampled points with a normal, of each slab.
     """
 
     surface: Surface
@@ -79,7 +79,7 @@ class TiledSurface:
     n_usable: NDArray[np.int64]
 
     def rows_of(self, slab: Slab, margin: float) -> Rows:
-        """Rows of the thinned points of a slab and of what is within `margin` voxels of it."""
+        """Rows of the downsampled points of a slab and of what is within `margin` voxels of it."""
         # Means of rounded coordinates may lie a micrometre outside their voxel.
         reach = int(np.ceil(margin)) + 1
         first = np.searchsorted(self.planes, slab.first - reach)
@@ -94,17 +94,17 @@ def parts_of(n_points: int) -> list[Rows]:
     return [(int(a), int(b)) for a, b in pairwise(bounds)]
 
 
-def thin_in_slabs(
+def downsample_in_slabs(
     engine: Engine,
     n_points: int,
     settings: ThinningSettings,
     slab_bytes: int,
     progress: Progress,
 ) -> TiledSurface:
-    """Thin the cloud "xyz" of the engine's store and estimate normals.
+    """Downsample the cloud "xyz" of the engine's store and estimate normals.
 
     Afterwards the store holds the surface, "members" (the cloud's points in the order of
-    their thinned points) and "starts" (where each thinned point's begin).
+    their downsampled points) and "starts" (where each downsampled point's begin).
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def thin_in_slabs(
     ends = np.cumsum(in_slab.sum(axis=0))
     store.create("members", (n_points,), index_type(n_points))
     begins = np.concatenate([np.zeros((len(parts), 1), np.int64), np.cumsum(in_slab, axis=1)], 1)
-    thinned = engine.run(
-        thin_slab,
+    downsampled = engine.run(
+        downsample_slab,
         [
             (k, begins[:, k : k + 2], int(ends[k] - in_slab[:, k].sum()), edge)
             for k in range(len(firsts))
@@ -150,20 +150,20 @@ def thin_in_slabs(
         (0.6, 1.0),
     )
     store.remove(*(f"part-{k}" for k in range(len(parts))))
-    surface_ends = np.cumsum([sum(n) for _, n in thinned])
+    surface_ends = np.cumsum([sum(n) for _, n in downsampled])
     last_planes = np.append(planes[firsts[1:] - 1], planes[-1])
     slabs = tuple(
         Slab(
             int(first_planes[k]),
             int(last_planes[k]),
             (int(ends[k] - in_slab[:, k].sum()), int(ends[k])),
-            (int(surface_ends[k] - sum(thinned[k][1])), int(surface_ends[k])),
+            (int(surface_ends[k] - sum(downsampled[k][1])), int(surface_ends[k])),
         )
         for k in range(len(firsts))
     )
     _gather(store, slabs, n_points)
-    kept_planes = np.concatenate([p for p, _ in thinned])
-    plane_starts = np.concatenate([[0], np.cumsum(np.concatenate([n for _, n in thinned]))])
+    kept_planes = np.concatenate([p for p, _ in downsampled])
+    plane_starts = np.concatenate([[0], np.cumsum(np.concatenate([n for _, n in downsampled]))])
     return _with_normals(engine, slabs, kept_planes, plane_starts, edge, progress)
 
 
@@ -189,7 +189,7 @@ def slab_bounds(
 
 
 def _gather(store: Store, slabs: tuple[Slab, ...], n_points: int) -> None:
-    """Put the thinned points of all slabs into one array."""
+    """Put the downsampled points of all slabs into one array."""
     m = slabs[-1].surface[1]
     xyz, starts = (
         store.create("surface", (m, 3), np.float64),
@@ -198,9 +198,9 @@ def _gather(store: Store, slabs: tuple[Slab, ...], n_points: int) -> None:
     starts[m] = n_points
     for k, slab in enumerate(slabs):
         rows = slice(*slab.surface)
-        xyz[rows] = store.open(f"thinned-{k}")
+        xyz[rows] = store.open(f"downsampled-{k}")
         starts[rows] = store.open(f"starts-{k}").astype(starts.dtype) + slab.points[0]
-        store.remove(f"thinned-{k}", f"starts-{k}")
+        store.remove(f"downsampled-{k}", f"starts-{k}")
 
 
 def _with_normals(
@@ -263,22 +263,22 @@ def sort_part(
     return np.bincount(slab, minlength=len(first_planes))
 
 
-def thin_slab(
+def downsample_slab(
     store: Store, number: int, begins: NDArray[np.int64], first_point: int, edge: float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Average a slab's voxels; return its planes and how many thinned points each holds."""
+    """Average a slab's voxels; return its planes and how many downsampled points each holds."""
     progress = StopWhenUnwanted(store)
     rows = np.concatenate(
         [store.open(f"part-{p}")[a:b] for p, (a, b) in enumerate(begins.tolist())]
     )
     xyz = store.open_coordinates()[rows]
     progress.update("thinning", 0.0)
-    thinned = average_voxels(xyz, edge, progress)
-    members, starts = thinned.behind
+    downsampled = average_voxels(xyz, edge, progress)
+    members, starts = downsampled.full_resolution_points
     progress.update("thinning", 1.0)
     all_members = store.open("members")
     all_members[first_point : first_point + len(rows)] = rows[members]
-    store.save(f"thinned-{number}", thinned.xyz)
+    store.save(f"downsampled-{number}", downsampled.xyz)
     store.save(f"starts-{number}", starts[:-1])
     plane = cells_of(xyz[members[starts[:-1]], 0], edge).astype(np.int64)
     planes, counts = np.unique(plane, return_counts=True)
@@ -286,7 +286,7 @@ def thin_slab(
 
 
 def fit_slab_planes(store: Store, own: Rows, near: Rows, edge: float) -> int:
-    """Fit planes to a slab's thinned points, with those of the margin around it."""
+    """Fit planes to a slab's downsampled points, with those of the margin around it."""
     xyz = np.array(store.open("surface")[slice(*near)])
     fitted = fit_planes(xyz, edge, StopWhenUnwanted(store))
     inside = slice(own[0] - near[0], own[1] - near[0])

@@ -4,13 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from pipecore.elements.refinement.extent import SHOWN_GAP, Extent
-from pipecore.elements.refinement.refine import Fitted
+from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII, Extent
+from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
-from pipecore.elements.runs import Span, meeting_ends
+from pipecore.elements.runs.ends import AxisSpan, Link, meeting_ends
+from pipecore.elements.runs.numbering import number_runs
 from pipecore.geometry import LineAxis
 
 Array = NDArray[np.float64]
@@ -23,27 +22,25 @@ SAME_RADIUS = 0.02
 
 
 def join_straights(
-    fitted: list[Fitted], links: list[tuple[int, int]]
-) -> tuple[list[Fitted], list[tuple[int, int]]]:
+    fitted: list[FittedElement], links: list[Link]
+) -> tuple[list[FittedElement], list[Link]]:
     """Join straights of one radius that meet end to end with a turn too small for an elbow.
 
     Parameters
     ----------
-    fitted : list of Fitted
+    fitted : list of FittedElement
     links : list of (int, int)
         Pairs of pieces that belong together; renumbered.
     """
-    spans = [Span(f.axis, f.radii) for f in fitted]
+    spans = [AxisSpan(f.axis, f.radii) for f in fitted]
     pairs = [(i, j) for i, _, j, _ in meeting_ends(spans) if _are_one_pipe(fitted[i], fitted[j])]
     if not pairs:
         return fitted, links
-    i, j = np.array(pairs).T
-    graph = coo_array((np.ones(len(i), np.int8), (i, j)), shape=(len(fitted), len(fitted)))
-    _, label = connected_components(graph, directed=False)
+    label = number_runs(len(fitted), pairs)
     # Numbers in the order of each group's first member.
-    _, first, label = np.unique(label, return_index=True, return_inverse=True)
+    _, first, group = np.unique(label, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))
-    number = rank[label]
+    number = rank[group]
     joined = []
     for k in range(len(first)):
         members = [fitted[m] for m in np.flatnonzero(number == k)]
@@ -51,7 +48,7 @@ def join_straights(
     return joined, [(int(number[a]), int(number[b])) for a, b in links]
 
 
-def _are_one_pipe(a: Fitted, b: Fitted) -> bool:
+def _are_one_pipe(a: FittedElement, b: FittedElement) -> bool:
     one, other = a.fit.model, b.fit.model
     if not isinstance(one, LineSurface) or not isinstance(other, LineSurface):
         return False
@@ -74,7 +71,7 @@ def _are_one_pipe(a: Fitted, b: Fitted) -> bool:
     )
 
 
-def _joined(parts: list[Fitted]) -> Fitted:
+def _joined(parts: list[FittedElement]) -> FittedElement:
     """One cylinder along the parts' axes, with the mean of their radii."""
     samples = np.concatenate([p.axis.at(np.linspace(0, p.axis.length, 20)) for p in parts])
     weight = np.repeat([p.axis.length for p in parts], 20)
@@ -102,7 +99,9 @@ def _joined(parts: list[Fitted]) -> Fitted:
         tuple(sorted((float((q - middle) @ direction) - low) for q in (p.axis.start, p.axis.end)))
         for p in parts
     )
-    between = [(a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > SHOWN_GAP * radius]
+    between = [
+        (a[1], b[0]) for a, b in pairwise(ends) if b[0] - a[1] > MIN_REPORTED_GAP_RADII * radius
+    ]
     extent = Extent(
         0.0,
         high - low,
@@ -110,10 +109,10 @@ def _joined(parts: list[Fitted]) -> Fitted:
         min(1.0, covered / (high - low)),
         tuple(between),
     )
-    return Fitted(
+    return FittedElement(
         fit,
         LineAxis(middle + low * direction, direction, high - low),
-        np.concatenate([p.own for p in parts]),
+        np.concatenate([p.inliers for p in parts]),
         extent,
         max(p.misfit for p in parts),
     )

@@ -1,4 +1,4 @@
-"""The thinned cloud: one mean point per cube of a grid."""
+"""The downsampled cloud: one mean point per cube of a grid."""
 
 from dataclasses import dataclass
 
@@ -20,26 +20,28 @@ CHUNK = 500_000
 
 
 @dataclass(frozen=True, eq=False)
-class ThinnedCloud:
+class DownsampledCloud:
     """One point per occupied voxel: the mean of the points in it.
 
     Parameters
     ----------
     xyz : ndarray
         Means in local coordinates, float64, shape (m, 3), in the order of the voxels.
-    behind : (ndarray of int, shape (n,), ndarray of int, shape (m + 1,))
-        The cloud's points in the order of their thinned points, and where those of each
+    full_resolution_points : (ndarray of int, shape (n,), ndarray of int, shape (m + 1,))
+        The cloud's points in the order of their downsampled points, and where those of each
         begin.
     voxel : float
         Edge of the voxels, metres.
     """
 
     xyz: NDArray[np.float64]
-    behind: Order
+    full_resolution_points: Order
     voxel: float
 
 
-def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> ThinnedCloud:
+def downsample(
+    cloud: PointCloud, settings: ThinningSettings, progress: Progress
+) -> DownsampledCloud:
     """Average the points of `cloud` in voxels.
 
     The voxels' edge is the setting's, or the median spacing of the points where that is
@@ -54,7 +56,7 @@ def thin(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> T
 
 def average_voxels(
     xyz: NDArray[np.floating], edge: float, progress: Progress = NoProgress()
-) -> ThinnedCloud:
+) -> DownsampledCloud:
     """Average points (n, 3) in voxels of `edge` metres.
 
     All points of some voxels give the same means as they do among those of other voxels.
@@ -67,4 +69,4 @@ def average_voxels(
         sorting.mean_points(xyz, order, starts, first, last, means)
 
     for_chunks(average, len(means), CHUNK, "thinning", progress, (0.8, 1.0))
-    return ThinnedCloud(means, (order, starts), edge)
+    return DownsampledCloud(means, (order, starts), edge)

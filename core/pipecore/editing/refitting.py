@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.editing.changes import with_settings, without
-from pipecore.elements import BuiltElements, NearbyPoints
+from pipecore.elements import NearbyPoints
 from pipecore.elements.refinement.extent import MAX_SECTORS, section_misfit
 from pipecore.elements.refinement.refine import axis_through, fit_measured
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, Array
-from pipecore.measurement import measure_elements
+from pipecore.measurement import MeasuringOptions, measure_elements
 from pipecore.progress import Progress, Renamed
 from pipecore.rules import judge, load_rule
 from pipecore.settings import ThinningSettings
@@ -33,11 +33,11 @@ from pipecore.types import (
 AROUND = 2.0
 """Points within this many radii of the axis take part in measuring."""
 MARGIN = 0.05
-"""... and within this of it, so that thinned points at the edge have their neighbours, metres."""
+"""... and within this of it, metres, so that points at the edge have their neighbours."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class RefittedElement:
     """An element after its fit; as it was where the points do not carry one."""
 
     element: Element
@@ -46,7 +46,7 @@ class Shape:
 
 def fit_shape(
     element: Element, part: PointCloud, thinning: ThinningSettings, progress: Progress
-) -> Shape:
+) -> RefittedElement:
     """Fit an element's surface to its points between its ends, as a detection does.
 
     Parameters
@@ -67,14 +67,14 @@ def fit_shape(
     chainage, _, _ = element.axis.pipe_coordinates(part.xyz.astype(np.float64))
     between = np.flatnonzero((chainage >= 0) & (chainage <= element.axis.length))
     if len(between) == 0:
-        return Shape(element, is_fitted=False)
+        return RefittedElement(element, is_fitted=False)
     part = part_of(part, between)
     surface = sample_surface(part, thinning, Renamed(progress, "fitting"))
-    nearby, thinned = NearbyPoints(part, surface), np.arange(len(surface.xyz))
+    nearby, downsampled = NearbyPoints(part, surface), np.arange(len(surface.xyz))
     model, scale = _model_of(element), 3.0 * max(element.rms, 0.001)
-    fit = fit_measured(model, thinned, nearby, scale, nearby.usual_spacing(thinned))
+    fit = fit_measured(model, downsampled, nearby, scale, nearby.usual_spacing(downsampled))
     if fit is None:
-        return Shape(element, is_fitted=False)
+        return RefittedElement(element, is_fitted=False)
     xyz = part.xyz.astype(np.float64)
     axis = axis_through(fit.model, np.stack([element.axis.start, element.axis.end]))
     residual, _, _ = fit.model.residuals(xyz)
@@ -87,7 +87,7 @@ def fit_shape(
     radii = fit.model.radius, fit.model.radius
     if isinstance(fit.model, LineSurface):
         radii = fit.model.radius_at(axis.start), fit.model.radius_at(axis.end)
-    return Shape(
+    return RefittedElement(
         replace(
             element,
             axis=axis,
@@ -139,14 +139,11 @@ def measure_anew(
     index = points_near(cloud, elements)
     part = part_of(cloud, index)
     surface = sample_surface(part, settings.thinning, progress)
-    built = BuiltElements(tuple(elements), tuple(np.empty(0, np.intp) for _ in elements))
     measured = measure_elements(
-        built,
+        elements,
         NearbyPoints(part, surface),
         len(part),
-        result.stacks[0].width,
-        settings.deformation,
-        settings.ellipses.fit,
+        MeasuringOptions(result.stacks[0].width, settings.deformation, settings.ellipses.fit),
         progress,
         others=rest.elements,
     )

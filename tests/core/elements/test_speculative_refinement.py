@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore import parallel
-from pipecore.elements.speculative_refinement import AHEAD, refine_in_turn
+from pipecore.elements.speculative_refinement import LOOKAHEAD_PER_THREAD, refine_speculatively
 from pipecore.errors import CancelledError
 from pipecore.progress import NoProgress
 
@@ -24,7 +24,7 @@ def what_is_left(piece, is_free, used):
 
 
 @pytest.mark.parametrize("n_threads", [1, 3])
-@pytest.mark.parametrize("n", [0, 1, AHEAD, 5 * AHEAD + 3])
+@pytest.mark.parametrize("n", [0, 1, LOOKAHEAD_PER_THREAD, 5 * LOOKAHEAD_PER_THREAD + 3])
 def test_that_the_result_is_that_of_one_after_the_other(rng, n_threads, n):
     pieces = wants(rng, n)
     is_free = np.ones(N_POINTS, np.bool_)
@@ -34,14 +34,14 @@ def test_that_the_result_is_that_of_one_after_the_other(rng, n_threads, n):
         expected.append(None if own is None else own.tolist())
         if own is not None:
             is_free[own] = False
-    assert n <= AHEAD or None in expected
+    assert n <= LOOKAHEAD_PER_THREAD or None in expected
 
     is_free[:] = True
     found = []
     before = parallel.threads()
     try:
         parallel.set_threads(n_threads)
-        for piece, own in refine_in_turn(
+        for piece, own in refine_speculatively(
             pieces,
             lambda piece, used: what_is_left(piece, is_free, used),
             is_free,
@@ -70,8 +70,8 @@ def test_that_it_can_be_cancelled_between_pieces(rng):
     stop, is_free = Stop(), np.ones(N_POINTS, np.bool_)
     with pytest.raises(CancelledError):
         list(
-            refine_in_turn(
-                wants(rng, AHEAD),
+            refine_speculatively(
+                wants(rng, LOOKAHEAD_PER_THREAD),
                 lambda piece, used: what_is_left(piece, is_free, used),
                 is_free,
                 stop,

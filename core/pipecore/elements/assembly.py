@@ -1,0 +1,199 @@
+"""Assembling what was selected: runs, fittings, tees and the final order of the elements."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipecore.catalogues import nominal_size
+from pipecore.elements.fittings.flanges import pair_flanges
+from pipecore.elements.fittings.tees import ElementPart, Junction, cut_tees, find_junctions
+from pipecore.elements.proposals import Proposal
+from pipecore.elements.refinement.nearby_points import NearbyPoints
+from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
+from pipecore.elements.runs.ends import AxisSpan, End, Link, meeting_ends
+from pipecore.elements.runs.joining import join_straights
+from pipecore.elements.runs.numbering import number_runs
+from pipecore.elements.runs.trimming import trim_to_each_other, trim_to_fitting
+from pipecore.elements.selection import select_elements
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.progress import Progress
+from pipecore.settings import ElementSettings
+from pipecore.types import Element, ElementKind
+
+KINDS_WITH_NOMINAL_SIZE = (ElementKind.CYLINDER, ElementKind.TORUS, ElementKind.TEE)
+"""Kinds whose radius is a pipe's."""
+MIN_LENGTH_RADII = 0.35
+"""Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
+MIN_PIPE_LENGTH_RADII = 6.0
+"""A straight that nothing follows is a pipe if it is longer than this many radii, else a vessel."""
+MIN_LONE_LENGTH_RADII, MIN_LONE_LENGTH = 3.0, 0.3
+"""Shortest element that is part of no run, in radii or in metres, whichever is less: limbs and
+bodies of people are shorter. A reducer is always part of a run."""
+
+
+def build_elements(
+    proposals: list[Proposal],
+    nearby: NearbyPoints,
+    settings: ElementSettings,
+    progress: Progress,
+) -> tuple[Element, ...]:
+    """Fit the proposed surfaces, keep those that pass the gates and join them to runs.
+
+    Points on one element are not available to the next, so that every surface is
+    reported once.
+
+    Parameters
+    ----------
+    proposals : list of Proposal
+        As from `propose_surfaces`, in any order.
+    nearby : NearbyPoints
+    settings : ElementSettings
+    progress : Progress
+        Receives fractions of the stage "elements".
+
+    Returns
+    -------
+    tuple of Element
+        The longest run first, along each run; ovality and straightness are not measured yet.
+
+    Raises
+    ------
+    CancelledError
+        From `progress`.
+    """
+    fitted, links = select_elements(proposals, nearby, settings, progress)
+    fitted, links = join_straights(fitted, links)
+    axes, met = _trim_axes(fitted, links)
+    kinds = [_kind(f) for f in fitted]
+    for flange, pipe in pair_flanges(fitted):
+        kinds[flange] = ElementKind.FLANGE
+        links.append((flange, pipe))
+    junctions = find_junctions(_spans(axes, fitted), met)
+    links += [(j.branch, j.run) for j in junctions]
+    run = number_runs(len(fitted), links)
+    tees = [j for j in junctions if _is_tee(j, fitted, kinds, met)]
+    return _number_elements(
+        [
+            (part, ElementKind.TEE if part.is_tee else kinds[part.whole], int(run[part.whole]))
+            for part in cut_tees(fitted, axes, tees, nearby.surface.xyz)
+            if _is_reported(part, kinds[part.whole], run, settings)
+        ],
+        settings,
+    )
+
+
+def _spans(axes: list[LineAxis | ArcAxis], fitted: list[FittedElement]) -> list[AxisSpan]:
+    return [AxisSpan(axis, f.radii) for axis, f in zip(axes, fitted, strict=True)]
+
+
+def _trim_axes(
+    fitted: list[FittedElement], links: list[Link]
+) -> tuple[list[LineAxis | ArcAxis], set[End]]:
+    """Axes that end where the next element begins; also the ends that another follows.
+
+    Adds the pairs of elements that follow each other to `links`.
+    """
+    axes = [f.axis for f in fitted]
+    for fitting, straight in links:
+        axes[straight], axes[fitting] = trim_to_fitting(axes[straight], axes[fitting])
+    met = set()
+    for i, end_i, j, end_j in meeting_ends(_spans(axes, fitted)):
+        links.append((i, j))
+        met |= {(i, end_i), (j, end_j)}
+        radius = fitted[i].fit.model.radius
+        axes[i], axes[j] = trim_to_each_other(axes[i], end_i, axes[j], end_j, radius)
+    return axes, met
+
+
+def _kind(found: FittedElement) -> ElementKind:
+    match found.fit.model:
+        case LineSurface(is_tapered=True):
+            return ElementKind.CONE
+        case LineSurface():
+            return ElementKind.CYLINDER
+        case ArcSurface():
+            return ElementKind.TORUS
+    return ElementKind.SPHERE
+
+
+def _is_tee(
+    junction: Junction,
+    fitted: list[FittedElement],
+    kinds: list[ElementKind],
+    met: set[End],
+) -> bool:
+    """Whether a branch in the side of a pipe makes it a tee, and not a vessel with a nozzle."""
+    run = fitted[junction.run]
+    is_followed = (junction.run, 0) in met or (junction.run, 1) in met
+    is_pipe = is_followed or run.axis.length > MIN_PIPE_LENGTH_RADII * run.fit.model.radius
+    return (
+        junction.is_wide
+        and is_pipe
+        and kinds[junction.run] is ElementKind.CYLINDER
+        and kinds[junction.branch] in (ElementKind.CYLINDER, ElementKind.TORUS)
+    )
+
+
+def _is_reported(
+    part: ElementPart, kind: ElementKind, run: NDArray[np.int32], settings: ElementSettings
+) -> bool:
+    """Whether an element is reported: a short one only if it is part of a run."""
+    if part.is_tee or kind in (ElementKind.SPHERE, ElementKind.FLANGE):
+        return True
+    radius, length = part.found.fit.model.radius, part.axis.length
+    is_alone = (run == run[part.whole]).sum() == 1
+    if is_alone and kind is ElementKind.CONE:
+        return False
+    if is_alone and length < max(
+        settings.min_length_mm / 1e3, min(MIN_LONE_LENGTH_RADII * radius, MIN_LONE_LENGTH)
+    ):
+        return False
+    return kind is not ElementKind.CYLINDER or length >= MIN_LENGTH_RADII * radius
+
+
+def _number_elements(
+    parts: list[tuple[ElementPart, ElementKind, int]], settings: ElementSettings
+) -> tuple[Element, ...]:
+    """Elements in their final order: the longest run first, along each run."""
+    if not parts:
+        return ()
+    length = np.bincount([run for _, _, run in parts], [part.axis.length for part, _, _ in parts])
+
+    def place(item: tuple[ElementPart, ElementKind, int]) -> tuple[float, ...]:
+        axis, run = item[0].axis, item[2]
+        return (-length[run], run, *np.round(axis.at(axis.length / 2), 6))
+
+    run_id: dict[int, int] = {}
+    elements: list[Element] = []
+    for part, kind, run in sorted(parts, key=place):
+        run_id.setdefault(run, len(run_id) + 1)
+        elements.append(_element(part, kind, len(elements) + 1, run_id[run], settings))
+    return tuple(elements)
+
+
+def _element(
+    part: ElementPart, kind: ElementKind, element_id: int, run_id: int, settings: ElementSettings
+) -> Element:
+    found = part.found
+    model = found.fit.model
+    start_radius, end_radius = replace(found, axis=part.axis).radii
+    size = nominal_size(2 * start_radius, settings.catalogue, settings.size_tolerance_pct)
+    shift = float(found.axis.pipe_coordinates(part.axis.start[None])[0][0])
+    return Element(
+        element_id=element_id,
+        run_id=run_id,
+        kind=kind,
+        axis=part.axis,
+        radius=start_radius,
+        radius_sd=found.radius_sd,
+        radius_end=end_radius,
+        centre=np.full(3, np.nan) if isinstance(model, LineSurface) else model.centre,
+        n_points=0,
+        n_profiles=0,
+        arc=found.extent.arc,
+        rms=found.fit.sigma,
+        nominal=size if kind in KINDS_WITH_NOMINAL_SIZE else None,
+        gaps=tuple((a - shift, b - shift) for a, b in found.extent.gaps),
+    )

@@ -1,0 +1,1 @@
+"""Runs: elements whose ends meet, and straights that are one pipe."""
