@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pipecore.axes import join_centres
 from pipecore.deformation import relate_deformations
@@ -35,13 +36,16 @@ STAGES = {
 
 
 def detect(
-    cloud: PointCloud, settings: Settings = Settings(), progress: Progress = NoProgress()
+    cloud: PointCloud | ArrayLike,
+    settings: Settings = Settings(),
+    progress: Progress = NoProgress(),
 ) -> Result:
     """Find the elements of a cloud and their deformations.
 
     Parameters
     ----------
-    cloud : PointCloud
+    cloud : PointCloud or array_like
+        Points as an array of shape (n, 3) are taken as `PointCloud.from_points` takes them.
     settings : Settings
     progress : Progress
         Receives the stages of `STAGES`.
@@ -57,7 +61,14 @@ def detect(
         If `progress` raises it.
     SettingsError
         If the acceptance rule of the settings cannot be read, or they ask for no stacks.
+    TypeError, ValueError
+        If the points are not an array of real, finite numbers of shape (n, 3), or the settings
+        are none.
     """
+    if not isinstance(settings, Settings):
+        raise TypeError(f"the settings must be pipecore.Settings, not {type(settings).__name__}")
+    if not isinstance(cloud, PointCloud):
+        cloud = PointCloud.from_points(cloud)
     return detect_in(InMemory(cloud), settings, progress)
 
 

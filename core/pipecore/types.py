@@ -6,19 +6,27 @@ that the scan cannot carry are nan, never a guess.
 """
 
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from operator import attrgetter
+from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+import pipecore
+from pipecore.caller_arrays import check_column, check_coordinates, check_positions
+from pipecore.display import Summarised
+from pipecore.formatting import format_clock, format_measure
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.local_frame import choose_origin, to_local
 from pipecore.reasons import Reason
 from pipecore.settings import Settings
+from pipecore.table import Table
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32] | NDArray[np.float64]
@@ -27,9 +35,12 @@ NO_ID = 0
 """The id of "none": ids of stacks, segments, elements, runs and deformations start at 1."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointCloud:
+@dataclass(frozen=True, eq=False, repr=False)
+class PointCloud(Summarised):
     """Points of one or several scans in one coordinate system.
+
+    Made by `read` from files and by `from_points` from arrays; the constructor takes what
+    is in its final form, and checks nothing.
 
     Parameters
     ----------
@@ -61,9 +72,84 @@ class PointCloud:
     crs: str = ""
     source: Path | None = None
 
+    @classmethod
+    def from_points(
+        cls,
+        xyz: ArrayLike,
+        *,
+        intensity: ArrayLike | None = None,
+        rgb: ArrayLike | None = None,
+        classification: ArrayLike | None = None,
+        stations: ArrayLike | None = None,
+        crs: str = "",
+    ) -> "PointCloud":
+        """Make a cloud of arrays, which are checked and copied.
+
+        Parameters
+        ----------
+        xyz : array_like
+            World coordinates in metres, shape (n, 3). float64, or float32 where that is
+            fine enough: at 400 km its steps are 3 cm.
+        intensity : array_like, optional
+            Shape (n,).
+        rgb : array_like, optional
+            Whole numbers from 0 to 255, shape (n, 3).
+        classification : array_like, optional
+            ASPRS classes, shape (n,).
+        stations : array_like, optional
+            Scanner positions in world coordinates, shape (3,) or (k, 3). They say along
+            which line each point's noise is, which makes radii better.
+        crs : str
+            The coordinate reference system's name.
+
+        Returns
+        -------
+        PointCloud
+            Its origin is a whole multiple of 100 m near the middle of the points.
+
+        Raises
+        ------
+        TypeError
+            If an array does not hold numbers of the kind that it should.
+        ValueError
+            If an array has another shape or length, or holds values that are not finite or
+            out of range.
+        """
+        world = check_coordinates(xyz)
+        origin = choose_origin(world) if len(world) else np.zeros(3)
+        n = len(world)
+        return cls(
+            origin=origin,
+            xyz=to_local(world, origin),
+            intensity=None
+            if intensity is None
+            else check_column(intensity, "the intensity", n, np.float32),
+            rgb=None if rgb is None else check_column(rgb, "the colours", n, np.uint8, 3),
+            classification=None
+            if classification is None
+            else check_column(classification, "the classes", n, np.uint8),
+            stations=np.empty((0, 3)) if stations is None else check_positions(stations) - origin,
+            crs=crs,
+        )
+
     def __len__(self) -> int:
         """Return the number of points."""
         return len(self.xyz)
+
+    def _title(self) -> str:
+        return "PointCloud"
+
+    def _facts(self) -> dict[str, str]:
+        columns = ("intensity", "rgb", "classification")
+        facts = {
+            "points": f"{len(self):,}",
+            "origin": "({:.10g}, {:.10g}, {:.10g}) m".format(*self.origin.tolist()),
+            "with": " + ".join(c for c in columns if getattr(self, c) is not None),
+            "scanner positions": str(len(self.stations) or ""),
+            "crs": self.crs,
+            "source": self.source.name if self.source else "",
+        }
+        return {name: text for name, text in facts.items() if text}
 
     def world(self, local: Array) -> Array:
         """World coordinates (float64) of local ones, any shape (..., 3)."""
@@ -112,8 +198,8 @@ class NominalSize:
     outside_diameter: float
 
 
-@dataclass(frozen=True, eq=False)
-class Element:
+@dataclass(frozen=True, eq=False, repr=False)
+class Element(Summarised):
     """One piece of a pipe run with one kind of surface about one axis.
 
     Parameters
@@ -175,6 +261,21 @@ class Element:
         """What people call it: its own name, else such as "Pipe 3" or "Bend 4"."""
         return self.name or f"{KIND_LABELS[self.kind]} {self.element_id}"
 
+    def _title(self) -> str:
+        return f"Element {self.label}"
+
+    def _facts(self) -> dict[str, str]:
+        facts = {
+            "run": str(self.run_id),
+            "size": self.nominal.name if self.nominal else "",
+            "radius": format_measure(1000 * self.radius, 1000 * self.radius_sd, "mm"),
+            "length": f"{self.axis.length:.3f} m",
+            "arc": f"{np.rad2deg(self.arc):.0f}°",
+            "ovality": format_measure(100 * self.ovality, 100 * self.ovality_sd, "%"),
+            "points": f"{self.n_points:,}",
+        }
+        return {name: text for name, text in facts.items() if text}
+
     def radius_at(self, chainage: Array | float) -> Array:
         """Radius of the fitted surface about the axis at `chainage`, metres."""
         s = np.asarray(chainage, dtype=np.float64)
@@ -201,8 +302,8 @@ OWN_STACK = 0
 """`Profiles.stack_id` of profiles cut across an element's own axis in the refinement."""
 
 
-@dataclass(frozen=True, eq=False)
-class Profiles:
+@dataclass(frozen=True, eq=False, repr=False)
+class Profiles(Summarised):
     """The profiles of all elements with their ellipses: a table, one array per column.
 
     Rows of one element and stack are in order of `chainage`.
@@ -275,6 +376,16 @@ class Profiles:
         """Return the given rows as a table."""
         return Profiles(*(getattr(self, f.name)[rows] for f in fields(self)))
 
+    def _title(self) -> str:
+        return "Profiles"
+
+    def _facts(self) -> dict[str, str]:
+        return {
+            "rows": f"{len(self):,}",
+            "elements": f"{len(np.unique(self.element_id)):,}",
+            "across elements' own axes": f"{np.count_nonzero(self.stack_id == OWN_STACK):,}",
+        }
+
     @property
     def flattening(self) -> Array:
         """1 - semi-minor / semi-major (paper, section 3.3.1)."""
@@ -328,8 +439,8 @@ class Verdict(StrEnum):
     NOT_MEASURABLE = "not measurable"
 
 
-@dataclass(frozen=True, eq=False)
-class Deformation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Deformation(Summarised):
     """A place where an element leaves its shape.
 
     Parameters
@@ -400,6 +511,21 @@ class Deformation:
     interacts: bool = False
     not_measurable: Mapping[str, Reason] = field(default_factory=dict)
 
+    def _title(self) -> str:
+        return f"Deformation {self.deformation_id}"
+
+    def _facts(self) -> dict[str, str]:
+        size = "height" if self.kind is DeformationKind.BULGE else "depth"
+        facts = {
+            "kind": str(self.kind),
+            "element": str(self.element_id),
+            size: format_measure(1000 * self.depth, 1000 * self.depth_sd, "mm"),
+            "chainage": f"{self.chainage:.3f} m",
+            "clock": format_clock(self.clock),
+            "verdict": str(self.verdict),
+        }
+        return {name: text for name, text in facts.items() if text}
+
 
 class ReviewState(StrEnum):
     """What a person decided about a deformation; the values are those of the report."""
@@ -417,8 +543,8 @@ class Review:
     comment: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Summarised):
     """What a detection found, with the settings that made it.
 
     Per-point arrays follow the order of the cloud's points.
@@ -439,7 +565,8 @@ class Result:
     deformations : tuple of Deformation
         In the order of their ids, as for elements.
     segment_id, element_id : ndarray of int32, shape (n,)
-        `NO_ID` for points of none.
+        `NO_ID` for points of none. These three are empty in a result that was loaded from a
+        report without ``segments.laz``.
     deviation : ndarray of float32, shape (n,)
         Signed radial distance from the element's reference contour, metres, outward
         positive; nan for points of none.
@@ -488,6 +615,76 @@ class Result:
     def deformations_of(self, element_id: int) -> tuple[Deformation, ...]:
         """Return the deformations of one element."""
         return tuple(d for d in self.deformations if d.element_id == element_id)
+
+    # Tables and reports stand above the types in the library: they are reached through the
+    # package itself, which imports them when they are first used.
+
+    def elements_table(self) -> Table:
+        """Return the elements as ``elements.csv`` has them; see `pipecore.report`."""
+        return pipecore.report.elements_table(self)
+
+    def profiles_table(self) -> Table:
+        """Return the profiles as ``profiles.csv`` has them."""
+        return pipecore.report.profiles_table(self)
+
+    def deformations_table(self) -> Table:
+        """Return the deformations as ``deformations.csv`` has them."""
+        return pipecore.report.deformations_table(self)
+
+    def save(
+        self,
+        folder: str | PathLike[str],
+        cloud: PointCloud | None = None,
+        *,
+        overwrite: bool = False,
+    ) -> None:
+        """Write a report folder, which `pipecore.load` reads back.
+
+        Parameters
+        ----------
+        folder : path
+            Made if it is not there; its parent must be.
+        cloud : PointCloud, optional
+            The cloud that this was detected in. Without it the folder has the tables,
+            ``result.json`` and ``settings.toml``, but neither ``segments.laz`` nor figures.
+        overwrite : bool
+            Whether the folder may already hold files.
+
+        Raises
+        ------
+        WriteError
+            If the folder holds files and `overwrite` is not set, or cannot be written.
+        ValueError
+            If the cloud is not the one of this result.
+        """
+        pipecore.report.write_report(folder, cloud, self, overwrite=overwrite)
+
+    def _title(self) -> str:
+        return "Result"
+
+    def _facts(self) -> dict[str, str]:
+        kinds = Counter(KIND_LABELS[e.kind].lower() for e in self.elements)
+        verdicts = Counter(str(d.verdict) for d in self.deformations)
+        facts = {
+            "elements": _counted(len(self.elements), kinds),
+            "runs": str(len({e.run_id for e in self.elements})),
+            "deformations": _counted(len(self.deformations), verdicts),
+            "profiles": f"{len(self.profiles):,}",
+            "points": f"{self.n_cloud_points:,}",
+            "source": self.source.name if self.source else "",
+        }
+        return {name: text for name, text in facts.items() if text}
+
+    def _repr_html_(self) -> str:
+        tables = (self.elements_table(), self.deformations_table())
+        shown = [table._repr_html_() for table in tables if table.n_rows]
+        return "".join([super()._repr_html_(), *shown])
+
+
+def _counted(total: int, parts: Counter[str]) -> str:
+    """A number with what it is made of, such as "5 (3 review, 2 reject)"."""
+    of = ", ".join(f"{n} {name}" for name, n in parts.most_common())
+    return f"{total} ({of})" if of else str(total)
 
 
 Numbered = TypeVar("Numbered", Element, Deformation)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pipecore
+from pipecore.consistency import check_result
 from pipecore.errors import PipecoreError
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress
@@ -32,7 +33,6 @@ from pipegui.model.document import Document, Scan, Selection, ViewOptions
 from pipegui.model.fingerprint import Fingerprint
 from pipegui.project.cloud_reference import CloudReference, CloudState
 from pipegui.project.json_codec import from_plain, to_plain
-from pipegui.project.validation import check_result
 
 SUFFIX = ".pipegui"
 FORMAT = "pipegui project"

@@ -6,6 +6,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -153,17 +154,51 @@ def test_that_a_wrong_choice_is_answered_with_the_right_ones() -> None:
 
 
 @pytest.mark.parametrize(
-    "groups",
+    ("group", "values"),
     [
-        {"thinning": ThinningSettings(voxel_mm=-1.0)},
-        {"stacks": StackSettings(preset="sideways")},  # type: ignore[arg-type]
-        {"stacks": StackSettings(directions=((0.0, 0.0, 0.0),))},
-        {"deformation": DeformationSettings(rule=6)},  # type: ignore[arg-type]
+        (ThinningSettings, {"voxel_mm": -1.0}),
+        (ThinningSettings, {"voxel_mm": "20"}),
+        (ThinningSettings, {"voxel_mm": None}),
+        (StackSettings, {"preset": "sideways"}),
+        (StackSettings, {"directions": ((0.0, 0.0, 0.0),)}),
+        (DeformationSettings, {"rule": 6}),
     ],
 )
-def test_that_no_constructor_lets_a_wrong_value_through(groups: dict[str, Any]) -> None:
-    with pytest.raises(SettingsError):
-        Settings(**groups)
+def test_that_no_group_takes_a_wrong_value(group: type, values: dict[str, Any]) -> None:
+    (name,) = values
+    with pytest.raises(SettingsError, match="stack" if name == "directions" else name):
+        group(**values)
+
+
+@pytest.mark.parametrize("value", [5, None, {"width_mm": 20.0}, ThinningSettings()])
+def test_that_a_group_is_given_as_one(value: Any) -> None:
+    with pytest.raises(SettingsError, match="“stacks” must be StackSettings"):
+        Settings(stacks=value)
+
+
+def test_that_settings_by_attributes_are_those_by_keys() -> None:
+    by_attributes = Settings(
+        stacks=StackSettings(preset="axes", width_mm=20, directions=[[0, 0, 1, 15]]),  # type: ignore[arg-type]
+        thinning=ThinningSettings(voxel_mm=np.float32(8)),  # type: ignore[arg-type]
+    )
+    by_keys = Settings().replace(
+        {
+            "stacks.preset": "axes",
+            "stacks.width_mm": 20,
+            "stacks.directions": "0,0,1,15",
+            "thinning.voxel_mm": 8,
+        }
+    )
+    assert by_attributes == by_keys
+    assert by_attributes.stacks.preset is DirectionPreset.AXES
+    assert type(by_attributes.stacks.width_mm) is type(by_attributes.thinning.voxel_mm) is float
+
+
+def test_that_settings_show_what_differs_from_the_defaults() -> None:
+    assert repr(Settings()) == "<Settings: all defaults>"
+    changed = Settings(stacks=StackSettings(width_mm=20))
+    assert repr(changed) == "<Settings: stacks.width_mm 20.0 mm>"
+    assert "<td>20.0 mm</td>" in changed._repr_html_()
 
 
 def test_that_replace_leaves_the_original_alone() -> None:

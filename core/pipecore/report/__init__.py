@@ -1,7 +1,8 @@
 """The report of a detection: tables for programs, a page for people, a cloud for viewers.
 
->>> from pipecore.report import write_report
+>>> from pipecore.report import load, write_report
 >>> write_report("report", cloud, result)
+>>> result = load("report")
 
 Importing this package imports neither the plot library nor the LAZ writer.
 """
@@ -14,10 +15,14 @@ from numpy.typing import NDArray
 
 from pipecore.io import write_directory, write_file, write_laz
 from pipecore.progress import NoProgress, Progress
+from pipecore.report.reading import load, result_from_dict
 from pipecore.report.result_json import result_to_dict, write_result_json
 from pipecore.report.summary import by_verdict, summarise
 from pipecore.report.tables import (
     NOT_REVIEWED,
+    deformations_table,
+    elements_table,
+    profiles_table,
     write_deformations_csv,
     write_elements_csv,
     write_profiles_csv,
@@ -27,6 +32,11 @@ from pipecore.types import PointCloud, Result, Review
 
 __all__ = [
     "by_verdict",
+    "deformations_table",
+    "elements_table",
+    "load",
+    "profiles_table",
+    "result_from_dict",
     "result_to_dict",
     "summarise",
     "write_deformation_mesh",
@@ -42,7 +52,7 @@ __all__ = [
 
 def write_report(
     directory: str | os.PathLike[str],
-    cloud: PointCloud,
+    cloud: PointCloud | None,
     result: Result,
     *,
     reviews: Mapping[int, Review] = NOT_REVIEWED,
@@ -59,8 +69,9 @@ def write_report(
     ----------
     directory : path
         Made if it is not there; its parent must be.
-    cloud : PointCloud
-        The cloud that `result` was detected in.
+    cloud : PointCloud or None
+        The cloud that `result` was detected in. Without it there is no ``segments.laz``,
+        ``report.html`` or ``deformations.ply``.
     result : Result
     reviews : mapping of int to Review
         What a person said of the deformations, by their ids.
@@ -71,6 +82,8 @@ def write_report(
 
     Raises
     ------
+    ValueError
+        If the cloud is not the one of the result.
     WriteError
         If the folder holds files and `overwrite` is not set, or a file cannot be written.
     SettingsError
@@ -79,12 +92,19 @@ def write_report(
         From `progress`.
     """
     progress = progress or NoProgress()
+    if cloud is not None and not len(cloud) == len(result.element_id) == result.n_cloud_points:
+        raise ValueError(
+            f"the cloud has {len(cloud):,} points, but the result has values for "
+            f"{len(result.element_id):,} of {result.n_cloud_points:,}"
+        )
     with write_directory(directory, overwrite=overwrite) as folder:
         (folder / "settings.toml").write_text(result.settings.to_toml(), encoding="utf-8")
         write_elements_csv(folder / "elements.csv", result)
         write_deformations_csv(folder / "deformations.csv", result, reviews)
         write_profiles_csv(folder / "profiles.csv", result, progress)
         write_result_json(folder / "result.json", result, progress)
+        if cloud is None:
+            return
         write_html(folder / "report.html", cloud, result, progress)
         write_segments(folder / "segments.laz", cloud, result, progress)
         if result.settings.deformation.mesh_exaggeration > 0:

@@ -151,7 +151,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
             format_measure(d.chainage, decimals=2),
             format_clock(d.clock),
             f"{_whole_mm(d.length)} × {_whole_mm(d.width)}",
-            place.spoken(d.peak),
+            place.display(d.peak),
             "; ".join(_remarks(d, result)),
         ]
         rows.append(row + ([_number_or_blank(100 * d.strain)] if has_strain else []))
@@ -320,7 +320,7 @@ def _where(d: Deformation, place: FileCoordinates) -> list[str]:
         parts.append(f"{format_clock(d.clock)} o’clock")
     if np.isfinite(d.area) and np.isfinite(d.volume):
         parts.append(f"{1e4 * d.area:.0f} cm², {1e6 * d.volume:.0f} cm³")
-    return [*parts, place.spoken(d.peak)]
+    return [*parts, place.display(d.peak)]
 
 
 def _blind_spot(result: Result, rule: Rule) -> str:

@@ -53,7 +53,7 @@ def _content(result: Result) -> dict[str, Any]:
         "metres_per_unit": unit.metres,
         "origin": _plain(result.origin),
         "n_cloud_points": result.n_cloud_points,
-        "n_element_points": int(np.count_nonzero(result.element_id)),
+        "n_element_points": _n_element_points(result),
         "settings": result.settings.to_dict(),
         "seconds": _plain(result.seconds),
         "edits": list(result.edits),
@@ -67,6 +67,12 @@ def _content(result: Result) -> dict[str, Any]:
         },
         "deformations": _plain(result.deformations),
     }
+
+
+def _n_element_points(result: Result) -> int | None:
+    """Points that lie on an element; None if that is not known."""
+    is_known = len(result.element_id) == result.n_cloud_points
+    return int(np.count_nonzero(result.element_id)) if is_known else None
 
 
 def write_result_json(path: Path, result: Result, progress: Progress | None = None) -> None:

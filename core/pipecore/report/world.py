@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore.formatting import cell, format_coordinate
+from pipecore.formatting import format_coordinate
 from pipecore.settings import LengthUnit
 from pipecore.types import Array, Result
 
@@ -30,11 +30,7 @@ class FileCoordinates:
         """File coordinates of local ones (metres), any shape (..., 3)."""
         return np.asarray((np.asarray(local, np.float64) + self.origin) / self.unit.metres)
 
-    def cells(self, local: Array) -> list[str]:
-        """The three coordinates of a local point for a table; "" where nan."""
-        return [cell(c, self.decimals) for c in self.of_local(local).tolist()]
-
-    def spoken(self, local: Array) -> str:
+    def display(self, local: Array) -> str:
         """The three coordinates of a local point for people, to the millimetre or so."""
         decimals = max(0, self.decimals - 1)
         return ", ".join(format_coordinate(c, decimals) for c in self.of_local(local).tolist())

@@ -14,8 +14,9 @@ from typing import Any, get_type_hints
 
 import tomli_w
 
+from pipecore.display import Summarised
 from pipecore.errors import SettingsError
-from pipecore.settings.fields import FieldSpec, check, convert
+from pipecore.settings.fields import FieldSpec, Group, convert, specs_of
 from pipecore.settings.groups import (
     DeformationSettings,
     DirectionPreset,
@@ -52,14 +53,20 @@ __all__ = [
 ]
 
 
-@dataclass(frozen=True)
-class Settings:
-    """All settings of a detection. Immutable; see `replace`.
+@dataclass(frozen=True, repr=False)
+class Settings(Summarised):
+    """All settings of a detection, in groups: ``settings.stacks.width_mm``.
+
+    Immutable; what is not given keeps its default:
+
+    >>> Settings(stacks=StackSettings(width_mm=15), elements=ElementSettings(min_radius_mm=30))
+    >>> Settings().replace({"stacks.width_mm": 15, "elements.min_radius_mm": 30})
 
     Raises
     ------
     SettingsError
-        From any constructor, if a value is of the wrong kind or outside its bounds.
+        From the constructor of any group, if a value is of the wrong kind or outside its
+        bounds.
     """
 
     input: InputSettings = InputSettings()
@@ -72,9 +79,27 @@ class Settings:
     tiling: TilingSettings = TilingSettings()
 
     def __post_init__(self) -> None:
-        """Check every value."""
-        for key, spec in iterate_fields():
-            check(key, self.get(key), spec)
+        """Check that each group is one; the groups check their values."""
+        for name, kind in _groups().items():
+            value = getattr(self, name)
+            if not isinstance(value, kind):
+                raise SettingsError(
+                    "“{group}” must be {kind}, not {value!r}.",
+                    group=name,
+                    kind=kind.__name__,
+                    value=value,
+                )
+
+    def _title(self) -> str:
+        return "Settings"
+
+    def _facts(self) -> dict[str, str]:
+        changed = {
+            key: f"{self.get(key)!s} {spec.unit}".rstrip()
+            for key, spec in iterate_fields()
+            if self.get(key) != spec.default
+        }
+        return changed or {"all": "defaults"}
 
     def get(self, key: str) -> Any:
         """Return a value by its dotted key, such as "stacks.width_mm"."""
@@ -95,7 +120,7 @@ class Settings:
             if key not in specs:
                 raise SettingsError("There is no setting “{key}”.", key=key)
             group, name = key.split(".")
-            grouped.setdefault(group, {})[name] = convert(key, value, specs[key])
+            grouped.setdefault(group, {})[name] = convert(value, specs[key])
         return dataclasses.replace(
             self,
             **{g: dataclasses.replace(getattr(self, g), **kw) for g, kw in grouped.items()},
@@ -153,11 +178,12 @@ class Settings:
             raise SettingsError("{path}: {error}", path=path, error=error) from error
 
 
+def _groups() -> dict[str, type[Group]]:
+    return get_type_hints(Settings)
+
+
 def iterate_fields() -> Iterator[tuple[str, FieldSpec]]:
     """Yield (dotted key, spec) of every setting, in order."""
-    groups = get_type_hints(Settings)
-    for group in dataclasses.fields(Settings):
-        kinds = get_type_hints(groups[group.name])
-        for f in dataclasses.fields(groups[group.name]):
-            spec = FieldSpec(group.name, f.name, kinds[f.name], f.default, **f.metadata)
-            yield f"{group.name}.{f.name}", spec
+    for kind in _groups().values():
+        for spec in specs_of(kind):
+            yield spec.key, spec

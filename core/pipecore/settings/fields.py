@@ -1,9 +1,10 @@
 """How a setting is declared, and how a value for it is converted and checked."""
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import Any, ClassVar, get_type_hints
 
 from pipecore.errors import SettingsError
 
@@ -67,14 +68,54 @@ class FieldSpec:
     zero_means: str
     advanced: bool
 
+    @property
+    def key(self) -> str:
+        """The dotted key, such as "stacks.width_mm"."""
+        return f"{self.group}.{self.name}"
 
-def convert(key: str, value: Any, spec: FieldSpec) -> Any:
-    """Turn text (from a flag) or plain TOML values into the field's type.
+
+class Group:
+    """A group of settings: a frozen dataclass whose fields are declared by `setting`.
 
     Raises
     ------
     SettingsError
-        If it cannot be.
+        If a value is of the wrong kind or outside its bounds.
+    """
+
+    name_in_settings: ClassVar[str]
+
+    def __init_subclass__(cls, *, name: str) -> None:
+        """Take the name that the group has in `Settings`."""
+        cls.name_in_settings = name
+
+    def __post_init__(self) -> None:
+        """Bring every value to its type, and check it."""
+        for spec in specs_of(type(self)):
+            value = getattr(self, spec.name)
+            # Text stands for a number in files and flags only.
+            if not (spec.kind is float and isinstance(value, str)):
+                value = convert(value, spec)
+                object.__setattr__(self, spec.name, value)
+            check(value, spec)
+
+
+def specs_of(group: type[Group]) -> tuple[FieldSpec, ...]:
+    """Return the specs of the fields of a group, in order."""
+    kinds = get_type_hints(group)
+    return tuple(
+        FieldSpec(group.name_in_settings, f.name, kinds[f.name], f.default, **f.metadata)
+        for f in dataclasses.fields(group)  # type: ignore[arg-type]
+    )
+
+
+def convert(value: Any, spec: FieldSpec) -> Any:
+    """Return text (from a flag) or a plain TOML value in the type of its setting.
+
+    Raises
+    ------
+    SettingsError
+        If it does not fit.
     """
     try:
         if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
@@ -83,16 +124,17 @@ def convert(key: str, value: Any, spec: FieldSpec) -> Any:
             return float(value)
         if spec.kind is str and isinstance(value, str):
             return value
-        if key == "stacks.directions":
+        if spec.key == "stacks.directions":
             if isinstance(value, str):
                 value = [vector.split(",") for vector in value.split(";") if vector.strip()]
             return tuple(tuple(float(c) for c in vector) for vector in value)
     except (ValueError, TypeError):
         pass
-    raise _misfit(key, value, spec)
+    raise _misfit(value, spec)
 
 
-def _misfit(key: str, value: object, spec: FieldSpec) -> SettingsError:
+def _misfit(value: object, spec: FieldSpec) -> SettingsError:
+    key = spec.key
     if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
         return SettingsError(
             "“{value}” does not fit the setting “{key}” (one of: {choices}).",
@@ -107,8 +149,9 @@ def _misfit(key: str, value: object, spec: FieldSpec) -> SettingsError:
     return SettingsError("“{value}” does not fit the setting “{key}”.", value=value, key=key)
 
 
-def check(key: str, value: Any, spec: FieldSpec) -> None:
-    """Raise SettingsError unless a value is of the field's type and within its bounds."""
+def check(value: Any, spec: FieldSpec) -> None:
+    """Raise `SettingsError` unless a value is of its setting's type and within its bounds."""
+    key = spec.key
     if spec.kind is float:
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
         if not is_number or not math.isfinite(value):
@@ -129,7 +172,7 @@ def check(key: str, value: Any, spec: FieldSpec) -> None:
                 value=value,
                 maximum=spec.maximum,
             )
-    elif key == "stacks.directions":
+    elif spec.key == "stacks.directions":
         for vector in value:
             usable = len(vector) in (3, 4) and all(map(math.isfinite, vector))
             if not usable or not any(vector[:3]) or vector[3:] < (0.0,) * len(vector[3:]):
@@ -138,4 +181,4 @@ def check(key: str, value: Any, spec: FieldSpec) -> None:
                     stack=list(vector),
                 )
     elif not isinstance(value, spec.kind):
-        raise _misfit(key, value, spec)
+        raise _misfit(value, spec)

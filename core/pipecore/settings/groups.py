@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from pipecore.settings.fields import setting
+from pipecore.settings.fields import Group, setting
 
 
 class LengthUnit(StrEnum):
@@ -53,7 +53,7 @@ class SizeCatalogue(StrEnum):
 
 
 @dataclass(frozen=True)
-class InputSettings:
+class InputSettings(Group, name="input"):
     """Reading the file."""
 
     length_unit: LengthUnit = setting(
@@ -62,7 +62,7 @@ class InputSettings:
 
 
 @dataclass(frozen=True)
-class ThinningSettings:
+class ThinningSettings(Group, name="thinning"):
     """The thinned cloud on which segments are found; measures use all points."""
 
     voxel_mm: float = setting(
@@ -77,7 +77,7 @@ class ThinningSettings:
 
 
 @dataclass(frozen=True)
-class StackSettings:
+class StackSettings(Group, name="stacks"):
     """Stacks of parallel profiles."""
 
     preset: DirectionPreset = setting(
@@ -102,7 +102,7 @@ class StackSettings:
 
 
 @dataclass(frozen=True)
-class ProfileSettings:
+class ProfileSettings(Group, name="profiles"):
     """Joining the points of a profile to curves."""
 
     method: ProfileMethod = setting(
@@ -131,7 +131,7 @@ class ProfileSettings:
 
 
 @dataclass(frozen=True)
-class EllipseSettings:
+class EllipseSettings(Group, name="ellipses"):
     """How ellipses are fitted, and which curves count as one."""
 
     fit: EllipseFit = setting(
@@ -171,7 +171,7 @@ class EllipseSettings:
 
 
 @dataclass(frozen=True)
-class ElementSettings:
+class ElementSettings(Group, name="elements"):
     """Sizes of the elements looked for."""
 
     min_radius_mm: float = setting(
@@ -206,7 +206,7 @@ class ElementSettings:
 
 
 @dataclass(frozen=True)
-class DeformationSettings:
+class DeformationSettings(Group, name="deformation"):
     """Which deviations count as deformations, and how they are judged."""
 
     min_depth_mm: float = setting(
@@ -249,7 +249,7 @@ class DeformationSettings:
 
 
 @dataclass(frozen=True)
-class TilingSettings:
+class TilingSettings(Group, name="tiling"):
     """Scans that do not fit into memory."""
 
     memory_gib: float = setting(

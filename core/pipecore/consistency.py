@@ -1,4 +1,4 @@
-"""Whether a result that was read is one that the rest of the program can rely on. Qt-free."""
+"""Whether the parts of a result that was read from a file go together."""
 
 import numpy as np
 
@@ -7,7 +7,17 @@ from pipecore.types import NO_ID, OWN_STACK, Element, Result
 
 
 def check_result(result: Result) -> None:
-    """Raise `ValueError` if parts of a result do not go together."""
+    """Check that ids are in order, positions finite, and that nothing refers to what is not there.
+
+    Parameters
+    ----------
+    result : Result
+
+    Raises
+    ------
+    ValueError
+        If parts of the result do not go together.
+    """
     _check_ids("stacks", [s.stack_id for s in result.stacks])
     ids = [e.element_id for e in result.elements]
     _check_ids("elements", ids)
@@ -47,7 +57,7 @@ def _check_ids(what: str, ids: list[int]) -> None:
 def _check_vectors(*vectors: np.ndarray) -> None:
     for vector in vectors:
         if vector.shape != (3,) or not np.isfinite(vector).all():
-            raise ValueError("a position is not one")
+            raise ValueError("a position is not three finite numbers")
 
 
 def _check_element(element: Element) -> None:
@@ -59,6 +69,6 @@ def _check_element(element: Element) -> None:
             _check_vectors(axis.centre, axis.normal, axis.towards_start)
     numbers = (axis.length, element.radius, element.radius_end)
     if not all(np.isfinite(n) and n > 0 for n in numbers) or element.run_id <= NO_ID:
-        raise ValueError(f"the measures of element {element.element_id} are none")
+        raise ValueError(f"element {element.element_id} has no length, radius or run")
     if element.centre.shape != (3,):
-        raise ValueError("a position is not one")
+        raise ValueError("a position is not three finite numbers")

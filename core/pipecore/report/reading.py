@@ -1,0 +1,247 @@
+"""Reading a report folder back: the inverse of `write_report`."""
+
+import dataclasses
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from pipecore.consistency import check_result
+from pipecore.errors import PipecoreError, ReadError
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.progress import NoProgress, Progress
+from pipecore.reasons import Reason
+from pipecore.report.result_json import FORMAT, FORMAT_VERSION
+from pipecore.settings import Settings
+from pipecore.types import (
+    Deformation,
+    DeformationKind,
+    Element,
+    ElementKind,
+    NominalSize,
+    Profiles,
+    Result,
+    Stack,
+    Verdict,
+)
+
+AXES = {"line": LineAxis, "arc": ArcAxis}
+POINT_COLUMNS = {"segment_id": np.int32, "element_id": np.int32, "deviation_mm": np.float32}
+"""What ``segments.laz`` holds of each point, and as what a result does."""
+
+POINTS_AT_A_TIME = 1_000_000
+
+
+def load(folder: str | os.PathLike[str], *, progress: Progress | None = None) -> Result:
+    """Read a result from a report folder.
+
+    Parameters
+    ----------
+    folder : path
+        As `write_report`, `Result.save` or ``pipecore detect`` made it; needed are
+        ``result.json`` and, for what belongs to each point, ``segments.laz``.
+    progress : Progress, optional
+        Told about the stage "reading"; may cancel.
+
+    Returns
+    -------
+    Result
+        Equal to the one that was written; numbers of profiles to the nanometre, deviations
+        of points to float32. Without ``segments.laz`` its arrays by point are empty.
+
+    Raises
+    ------
+    ReadError
+        If there is no report of a version that this program knows, or it contradicts itself.
+    CancelledError
+        From `progress`.
+    """
+    folder, progress = Path(folder), progress or NoProgress()
+    progress.update("reading", 0.0)
+    path = folder / "result.json"
+    try:
+        plain = orjson.loads(path.read_bytes())
+        check_format(plain)
+        result = result_from_dict(plain)
+        segments = folder / "segments.laz"
+        if segments.is_file():
+            columns = _read_point_columns(segments, result.n_cloud_points, progress)
+            result = dataclasses.replace(
+                result,
+                segment_id=columns["segment_id"],
+                element_id=columns["element_id"],
+                deviation=(columns["deviation_mm"] / 1000).astype(np.float32),
+            )
+        check_result(result)
+    except OSError as error:
+        raise ReadError(
+            "“{folder}” is not a report that can be read: {error}.",
+            folder=folder,
+            error=error.strerror or error,
+        ) from error
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
+        raise ReadError(
+            "The report in “{folder}” is damaged: {error}.", folder=folder, error=error
+        ) from error
+    progress.update("reading", 1.0)
+    return result
+
+
+def check_format(plain: Any) -> None:
+    """Raise `ValueError` unless a JSON value is a result of a version that is known here."""
+    if not isinstance(plain, dict) or plain.get("format") != FORMAT:
+        raise ValueError("result.json holds no result of pipecore")
+    if plain.get("format_version") != FORMAT_VERSION:
+        raise ValueError(
+            f"its format {plain.get('format_version')} is not known to this program, which "
+            f"reads {FORMAT_VERSION}"
+        )
+
+
+def result_from_dict(plain: Mapping[str, Any]) -> Result:
+    """Return the result that `result_to_dict` made plain; its arrays by point are empty.
+
+    Parameters
+    ----------
+    plain : mapping
+        Keys that are not known are left out, and those that are not there keep their
+        defaults, so that a report of another program of the same format can be read.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        If it is none.
+    """
+    try:
+        settings = Settings.from_dict(plain["settings"])
+        own_settings = {
+            int(i): Settings.from_dict(s) for i, s in plain.get("own_settings", {}).items()
+        }
+    except PipecoreError as error:
+        raise ValueError(str(error)) from error
+    return Result(
+        settings=settings,
+        origin=_vector(plain["origin"]),
+        source=Path(plain["source"]) if plain["source"] else None,
+        n_cloud_points=int(plain["n_cloud_points"]),
+        stacks=tuple(_made(Stack, s, direction=_vector) for s in plain["stacks"]),
+        elements=tuple(_element(e) for e in plain["elements"]),
+        profiles=_profiles(plain["profiles"]),
+        deformations=tuple(_deformation(d) for d in plain["deformations"]),
+        segment_id=np.empty(0, np.int32),
+        element_id=np.empty(0, np.int32),
+        deviation=np.empty(0, np.float32),
+        seconds={str(step): float(s) for step, s in plain["seconds"].items()},
+        edits=tuple(plain.get("edits", ())),
+        run_names={int(i): str(name) for i, name in plain.get("run_names", {}).items()},
+        own_settings=own_settings,
+    )
+
+
+Noun = TypeVar("Noun")
+
+
+def _made(
+    kind: Callable[..., Noun], plain: Mapping[str, Any], /, **read: Callable[[Any], Any]
+) -> Noun:
+    """Make a noun of the pipeline; `read` says how to read what is not a number or text."""
+    values = {}
+    for f in dataclasses.fields(kind):  # type: ignore[arg-type]
+        if f.name in plain:
+            value = plain[f.name]
+            if f.name in read:
+                values[f.name] = read[f.name](value)
+            else:
+                values[f.name] = np.nan if value is None else value
+    return kind(**values)
+
+
+def _element(plain: Mapping[str, Any]) -> Element:
+    return _made(
+        Element,
+        plain,
+        kind=ElementKind,
+        axis=_axis,
+        centre=_vector,
+        nominal=lambda size: size and _made(NominalSize, size),
+        gaps=lambda gaps: tuple((float(start), float(end)) for start, end in gaps),
+        not_measurable=_reasons,
+    )
+
+
+def _deformation(plain: Mapping[str, Any]) -> Deformation:
+    return _made(
+        Deformation,
+        plain,
+        kind=DeformationKind,
+        verdict=Verdict,
+        peak=_vector,
+        not_measurable=_reasons,
+    )
+
+
+def _axis(plain: Mapping[str, Any]) -> LineAxis | ArcAxis:
+    kind: Callable[..., LineAxis | ArcAxis] = AXES[plain["kind"]]
+    vectors = ("start", "direction", "centre", "normal", "towards_start")
+    return _made(kind, plain, **dict.fromkeys(vectors, _vector))
+
+
+def _vector(plain: Any) -> NDArray[np.float64]:
+    return np.array(plain, np.float64)  # None becomes nan
+
+
+def _reasons(plain: Mapping[str, str]) -> dict[str, Reason]:
+    return {str(name): Reason(why) for name, why in plain.items()}
+
+
+def _profiles(plain: Mapping[str, Any]) -> Profiles:
+    empty = Profiles.empty()
+    columns = {}
+    n_rows = len(plain["element_id"])
+    for f in dataclasses.fields(Profiles):
+        if f.name not in plain:
+            continue
+        like = getattr(empty, f.name)
+        column = np.array(plain[f.name], like.dtype)
+        if column.size == 0:
+            column = column.reshape(like.shape)
+        if column.shape != (n_rows, *like.shape[1:]):
+            raise ValueError(f"the column {f.name} of its profiles has shape {column.shape}")
+        columns[f.name] = column
+    return Profiles(**columns)
+
+
+def _read_point_columns(path: Path, n_points: int, progress: Progress) -> dict[str, NDArray[Any]]:
+    """Read what ``segments.laz`` says of each point, in the order of the cloud."""
+    import laspy  # noqa: PLC0415 - slow to import
+    from laspy.errors import LaspyException  # noqa: PLC0415
+    from lazrs import LazrsError  # type: ignore[import-untyped]  # noqa: PLC0415
+
+    try:
+        with laspy.open(path) as reader:
+            n_held = reader.header.point_count
+            missing = POINT_COLUMNS.keys() - set(reader.header.point_format.extra_dimension_names)
+            if n_held != n_points or missing:
+                raise ValueError(
+                    f"segments.laz does not belong to it ({n_held:,} points, not {n_points:,}"
+                    + "".join(f"; no {name}" for name in sorted(missing))
+                    + ")"
+                )
+            columns: dict[str, NDArray[Any]] = {
+                name: np.empty(n_points, dtype) for name, dtype in POINT_COLUMNS.items()
+            }
+            start = 0
+            for points in reader.chunk_iterator(POINTS_AT_A_TIME):
+                progress.update("reading", start / n_points)
+                for name, column in columns.items():
+                    column[start : start + len(points)] = points[name]
+                start += len(points)
+    except (LaspyException, LazrsError) as error:
+        raise ValueError(f"segments.laz: {error}") from error
+    if start != n_points:
+        raise ValueError(f"segments.laz ends after {start:,} points")
+    return columns
