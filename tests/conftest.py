@@ -51,9 +51,14 @@ def rng(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed)
 
 
-@pytest.fixture(scope="session")
-def shared_data() -> Path:
-    """The folder of real scans and odd files; skips the test on a machine without it."""
+@pytest.fixture
+def shared_data(request: pytest.FixtureRequest) -> Path:
+    """The folder of real scans and odd files; without it the test is skipped and says what is lost.
+
+    What such a test is about stands in another one too, on a file that it writes itself.
+    """
     if not SHARED_DATA.is_dir():
-        pytest.skip(f"the folder of real scans is not here ({SHARED_DATA})")
+        name = without_seed(request.node.name)
+        lost = name.removeprefix("test_that_").replace("_", " ")
+        pytest.skip(f"not seen without the files of other programs: that {lost}")
     return SHARED_DATA

@@ -9,6 +9,9 @@ from pipecore import io
 from pipecore.errors import ReadError
 from tests.core.io.writers import CARTESIAN, SPHERICAL, cartesian, integers, write_e57
 
+PAGE = 1024
+"""Bytes of a page of E57; its last four are the checksum of the others."""
+
 
 def test_that_points_come_back_within_a_tenth_of_a_millimetre_at_ten_thousand_kilometres(
     tmp_path: Path, points: Any
@@ -108,6 +111,22 @@ def test_that_a_scan_without_points_does_not_hide_the_others(tmp_path: Path, poi
     path = write_e57(tmp_path / "a.e57", [empty, {"columns": cartesian(points.xyz)}, empty])
     assert points.hold(io.read(path))
     assert io.info(path).n_scans == 3
+
+
+def test_that_a_scan_without_points_alone_is_told(tmp_path: Path) -> None:
+    path = write_e57(tmp_path / "a.e57", [{"columns": cartesian(np.empty((0, 3)))}])
+    with pytest.raises(ReadError, match=r"a\.e57.*no valid points"):
+        io.read(path)
+
+
+def test_that_a_page_that_does_not_fit_its_checksum_is_told(tmp_path: Path, points: Any) -> None:
+    path = write_e57(tmp_path / "a.e57", [{"columns": cartesian(points.xyz)}])
+    raw = bytearray(path.read_bytes())
+    raw[PAGE + 100] ^= 0xFF
+    path.write_bytes(raw)
+    with pytest.raises(ReadError, match=r"a\.e57.*checksum"):
+        io.read(path)
+    assert path.exists()
 
 
 def test_that_a_file_that_cannot_be_opened_stays_where_it_is(shared_data: Path) -> None:

@@ -12,7 +12,7 @@ from pipecore.io import read
 from pipecore.pipeline import STAGES, detect
 from pipecore.settings import Settings
 from pipecore.simulate import Scan, Scanner, Scene, scan
-from pipecore.simulate.scene import Box, Elbow, Reducer, Run, Straight
+from pipecore.simulate.scene import Box, Elbow, Flange, Reducer, Run, Straight
 from pipecore.simulate.scoring import score
 from pipecore.types import NO_ID, ElementKind, PointCloud, Result
 from tests.core.shapes import cloud_of, plane, random_rotation, tube
@@ -238,14 +238,44 @@ def test_that_own_stacks_alone_are_enough(rng):
     assert all(name.startswith(names[0]) for name in names)
 
 
-def test_that_the_pipes_of_a_real_pump_have_their_sizes(shared_data):
-    cloud = read(shared_data / "pump_visual_ref.e57")
-    result = detect(cloud)
+def pump(seed: int) -> Scene:
+    """A pump as the real one: one station, short pipes between flanges, vessels seen over 70°."""
+    along = (-0.61, -0.79, 0.0)
+    flange = Flange(0.14, 0.04)
+    risers = [
+        Run(foot, (0.0, 0.0, 1.0), 0.088, (flange, Straight(0.94), flange))
+        for foot in ((-1.1, -1.95, 0.1), (0.35, -3.5, 0.1))
+    ]
+    header = Run((-0.25, -3.01, 1.55), along, 0.115, (Flange(0.17, 0.06), Straight(1.7)))
+    vessels = [
+        Run(end, along, 0.375, (Straight(0.7),))
+        for end in ((0.8, -3.48, -1.08), (-0.91, -2.2, -1.08))
+    ]
+    small = [
+        Run((-0.52 - 0.1 * i, -2.49, 1.35), along, radius, (Straight(2.0),))
+        for i, radius in enumerate((0.031, 0.022))
+    ]
+    return Scene(
+        (*risers, header, *vessels, *small),
+        ((0.0, 0.0, 0.0),),
+        (Box((-0.5, -3.0, -1.8), (4.6, 4.5, 0.1)),),
+        Scanner(spacing=0.012, noise=0.0015),
+        ORIGIN,
+        seed=seed,
+    )
+
+
+def assert_that_it_has_the_sizes_of_the_pump(result: Result) -> None:
     pipes = [e for e in result.elements if e.kind is ElementKind.CYLINDER]
-    found = sorted(round(1e3 * e.radius, 1) for e in pipes)
-    print("radii of cylinders, mm:", found)
     upright = [e for e in pipes if abs(e.axis.tangent(0.0)[2]) > 0.97]
-    risers = [e for e in upright if abs(e.radius - 0.088) < 0.003]
-    assert len(risers) >= 2
+    assert sum(abs(e.radius - 0.088) < 0.003 for e in upright) >= 2
     assert any(abs(e.radius - 0.115) < 0.003 for e in pipes)
     assert sum(abs(e.radius - 0.375) < 0.003 for e in pipes) >= 2
+
+
+def test_that_the_pipes_of_a_real_pump_have_their_sizes(shared_data):
+    assert_that_it_has_the_sizes_of_the_pump(detect(read(shared_data / "pump_visual_ref.e57")))
+
+
+def test_that_the_pipes_of_a_pump_seen_from_one_station_have_their_sizes(session_seed):
+    assert_that_it_has_the_sizes_of_the_pump(detect(scan(pump(session_seed)).cloud))
