@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, Signal, SignalInstance
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QToolButton, QWidget
 
@@ -37,7 +37,7 @@ class ClipBar(QWidget):
         self._applying = Applying()
         self._origin = np.zeros(3)
         self._box: Box | None = None
-        row = QHBoxLayout(self)
+        row = self._row = QHBoxLayout(self)
         row.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)
         row.setContentsMargins(theme.SPACING, 2, theme.SPACING, 2)
         row.setSpacing(theme.SPACING // 2)
@@ -67,7 +67,7 @@ class ClipBar(QWidget):
             self.selection_requested,
         )
         self.invert = self._button(
-            tr("Outside"),
+            tr("Invert"),
             tr("Show what is outside the box instead of what is in it"),
             "select-inverse",
             self.inverted,
@@ -129,7 +129,7 @@ class ClipBar(QWidget):
             else b.iconSize().width() + ICON_FRAME
             for b in self._icons
         ]
-        between = self.layout().spacing() * self.layout().count() + 2 * theme.SPACING
+        between = self._row.spacing() * self._row.count() + 2 * theme.SPACING
         return sum(fields) + sum(names) + sum(buttons) + between
 
     def _fit(self) -> None:
@@ -140,7 +140,7 @@ class ClipBar(QWidget):
         for button in self._icons:
             button.setToolButtonStyle(style)
 
-    def _button(self, text: str, tip: str, icon: str, signal: Signal) -> QToolButton:
+    def _button(self, text: str, tip: str, icon: str, signal: SignalInstance) -> QToolButton:
         button = QToolButton()
         button.setText(text)
         button.setToolTip(tip)
@@ -156,5 +156,5 @@ class ClipBar(QWidget):
             return
         ends = [list(self._box.low), list(self._box.high)]
         ends[side][axis] = value - float(self._origin[axis])
-        low, high = (tuple(end) for end in ends)
-        self.changed.emit(replace(self._box, low=low, high=high))
+        (x, y, z), (x_high, y_high, z_high) = ends
+        self.changed.emit(replace(self._box, low=(x, y, z), high=(x_high, y_high, z_high)))

@@ -177,8 +177,10 @@ class DeformationModel(QAbstractTableModel):
 class DeformationFilter(QSortFilterProxyModel):
     """Sorts by value and leaves out what the user does not want to see."""
 
-    def __init__(self, parent: QObject | None = None) -> None:
+    def __init__(self, model: DeformationModel, parent: QObject | None = None) -> None:
         super().__init__(parent)
+        self._model = model
+        self.setSourceModel(model)
         self.kind: DeformationKind | None = None
         self.verdict: Verdict | None = None
         self.min_depth_mm = 0.0
@@ -198,20 +200,19 @@ class DeformationFilter(QSortFilterProxyModel):
 
     def filterAcceptsRow(self, source_row: int, source_parent: Index) -> bool:  # noqa: N802
         """Whether a deformation is shown."""
-        deformation = self.sourceModel().deformation(source_row)
+        deformation = self._model.deformation(source_row)
         return (
             self.kind in (None, deformation.kind)
             and self.verdict in (None, deformation.verdict)
-            and self.state in (None, self.sourceModel().review(source_row).state)
+            and self.state in (None, self._model.review(source_row).state)
             # Without a depth a deformation is rather shown than overlooked.
             and not bool(1000 * deformation.depth < self.min_depth_mm)
         )
 
     def lessThan(self, left: Index, right: Index) -> bool:  # noqa: N802
         """Compare values, not texts; what is not measurable comes last."""
-        model = self.sourceModel()
-        a = model.sort_key(left.row(), left.column())
-        b = model.sort_key(right.row(), right.column())
+        a = self._model.sort_key(left.row(), left.column())
+        b = self._model.sort_key(right.row(), right.column())
         if isinstance(a, float) and isinstance(b, float) and (isnan(a) or isnan(b)):
             return not isnan(a)
         return bool(a < b)  # numpy's own bool crashes Qt

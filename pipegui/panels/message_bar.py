@@ -87,7 +87,8 @@ class MessageBar(QFrame):
         for text, act in answers.items():
             button = QToolButton()
             button.setText(text)
-            button.clicked.connect(lambda _=False, act=act: (self.hide(), act()))
+            button.clicked.connect(self.hide)
+            button.clicked.connect(lambda _=False, act=act: act())
             self._row.insertWidget(self._row.count() - 1, button)
             self.answer_buttons.append(button)
 

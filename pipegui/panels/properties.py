@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
 )
 
 from pipegui.i18n.texts import tr
-from pipegui.panels.widgets import EmptyHint
+from pipegui.panels.widgets import EmptyHint, items_of
 from pipegui.states.descriptions import Heading, properties
 from pipegui.states.view_state import PropertiesState
 from pipegui.style import theme
@@ -71,7 +71,7 @@ class PropertiesPanel(QWidget):
 
     def copy(self) -> None:
         """Copy the selected lines (all, if none is) as label and plain number."""
-        every = [self.list.topLevelItem(i) for i in range(self.list.topLevelItemCount())]
+        every = items_of(self.list)
         lines = [item for item in every if item.isSelected()] or every
         text = "".join(
             f"{item.text(0)}\t{item.data(1, Qt.ItemDataRole.UserRole) or ''}\n" for item in lines

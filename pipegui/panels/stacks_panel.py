@@ -23,7 +23,7 @@ from pipecore.types import NO_ID, Stack
 from pipegui.i18n.texts import mark, tr
 from pipegui.panels.cutting_fields import CuttingFields
 from pipegui.panels.stack_editor import StackEditor
-from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox
+from pipegui.panels.widgets import Applying, EmptyHint, QuietComboBox, items_of
 from pipegui.states.preview_state import PlanState
 from pipegui.states.view_state import StacksState
 from pipegui.style import theme
@@ -163,8 +163,13 @@ class StacksPanel(QWidget):
         self.cutting.apply(state)
         if self._waits_for_points and state.measured not in (None, before.measured):
             self._take_points(state)
-        as_before = {"shown_stack": before.shown_stack, "measured": before.measured}
-        if replace(state, profiles=before.profiles, **as_before) == before:
+        as_before = replace(
+            state,
+            profiles=before.profiles,
+            shown_stack=before.shown_stack,
+            measured=before.measured,
+        )
+        if as_before == before:
             # A tick is answered in place: its item must outlive the signal that it sends.
             self._show_ticks(state.shown_stack)
         else:
@@ -177,8 +182,7 @@ class StacksPanel(QWidget):
 
     def _show_ticks(self, shown_stack: int) -> None:
         with self._applying:
-            for row in range(self.list.topLevelItemCount()):
-                item = self.list.topLevelItem(row)
+            for item in items_of(self.list):
                 stack_id = item.data(NAME, STACK_ID)
                 if stack_id is not None:
                     ticked = stack_id == shown_stack
@@ -201,8 +205,7 @@ class StacksPanel(QWidget):
             default = state.settings.width_mm
             for index, direction in own.items():
                 self._add_planned(index, direction, default)
-            for row in range(self.list.topLevelItemCount()):
-                item = self.list.topLevelItem(row)
+            for item in items_of(self.list):
                 if selected is not None and item.data(NAME, OWN_INDEX) == selected:
                     self.list.setCurrentItem(item)
         has_stacks = self.list.topLevelItemCount() > 0

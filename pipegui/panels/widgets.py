@@ -2,7 +2,14 @@
 
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QDoubleSpinBox, QLabel, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QDoubleSpinBox,
+    QLabel,
+    QTreeWidget,
+    QTreeWidgetItem,
+    QWidget,
+)
 
 from pipegui.style import theme
 
@@ -24,6 +31,12 @@ class Applying:
 
     def __exit__(self, *exc_info: object) -> None:
         self._depth -= 1
+
+
+def items_of(tree: QTreeWidget) -> list[QTreeWidgetItem]:
+    """Return the items at the top of a tree, in their order."""
+    items = (tree.topLevelItem(row) for row in range(tree.topLevelItemCount()))
+    return [item for item in items if item is not None]
 
 
 class EmptyHint(QLabel):

@@ -1,8 +1,10 @@
 """What the plots share: a themed pyqtgraph canvas, a line to read from, and a word if empty."""
 
 from collections.abc import Callable
+from functools import partial
 
 import pyqtgraph as pg
+from pyqtgraph.GraphicsScene.mouseEvents import MouseClickEvent
 from PySide6.QtCore import QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QAction, QColor, QCursor, QFont, QGuiApplication, QKeySequence
 from PySide6.QtWidgets import (
@@ -150,10 +152,10 @@ class Chart(QWidget):
             menu.addAction(action)
         menu.addSeparator()
         for ending, text in SAVED_AS.items():
-            menu.addAction(tr(text), lambda ending=ending: self.save_requested.emit(ending))
+            menu.addAction(tr(text), partial(self.save_requested.emit, ending))
         return menu
 
-    def _open_menu(self, event: object) -> None:
+    def _open_menu(self, event: MouseClickEvent) -> None:
         self.setFocus()
         if event.button() == Qt.MouseButton.RightButton:
             self.menu.popup(QCursor.pos())
@@ -181,7 +183,7 @@ class Chart(QWidget):
     def on_click(self, act: Callable[[pg.PlotItem, QPointF], None]) -> None:
         """Call `act` with plot and position in the canvas when a plot is clicked."""
 
-        def clicked(event: object) -> None:
+        def clicked(event: MouseClickEvent) -> None:
             plot = self._plot_at(event.scenePos())
             if plot is not None and event.button() == Qt.MouseButton.LeftButton:
                 act(plot, event.scenePos())

@@ -50,9 +50,9 @@ class DeviationMapView(Chart):
         self._image = pg.ImageItem(axisOrder="row-major")
         self._shapes: list[object] = []
         self.plot.addItem(self._image)
-        self.cursor = pg.ScatterPlotItem(size=14, brush=pg.mkBrush(None), antialias=True)
-        self.cursor.setZValue(20)
-        self.plot.addItem(self.cursor, ignoreBounds=True)
+        self.cursor_mark = pg.ScatterPlotItem(size=14, brush=pg.mkBrush(None), antialias=True)
+        self.cursor_mark.setZValue(20)
+        self.plot.addItem(self.cursor_mark, ignoreBounds=True)
         self.on_click(self._click)
         self.on_hover(self._hover)
         self.setAccessibleName(tr("Deviation map"))
@@ -64,34 +64,35 @@ class DeviationMapView(Chart):
         if state == before and not is_new_theme:
             return
         element = state.element
-        has_points = element is not None and bool(np.isfinite(state.points.deviation).any())
+        has_points = bool(np.isfinite(state.points.deviation).any())
         self.empty.setText(
             tr(EMPTY)
             if element is None
             else tr("{label} has no points with a deviation.").format(label=label_of(element))
         )
-        self.show_filled(has_points)
+        self.show_filled(element is not None and has_points)
         self.scale.set_limit(state.limit_mm)
         self.readout.clear()
-        if not has_points:
+        if element is None or not has_points:
             self._grid = None
             return
         is_other = element is not before.element or state.points is not before.points
         if is_other:
             self._grid = grid_deviation(element, state.points)
-        self._draw_image()
+        if self._grid is not None:
+            self._draw_image(self._grid)
         self._draw_shapes()
         if is_other:
             self.fit()
 
     # Drawing
 
-    def _draw_image(self) -> None:
-        values = 1000 * self._grid.deviation.T
+    def _draw_image(self, grid: DeviationGrid) -> None:
+        values = 1000 * grid.deviation.T
         colours = deviation_colours(values, self.state.limit_mm)
         opaque = np.where(np.isfinite(values), 255, 0).astype(np.uint8)
         self._image.setImage(np.dstack([colours, opaque]), levels=(0, 255))
-        self._image.setRect(QRectF(self._grid.start, -180, self._grid.length, 360))
+        self._image.setRect(QRectF(grid.start, -180, grid.length, 360))
 
     def _draw_shapes(self) -> None:
         for shape in self._shapes:
@@ -130,7 +131,8 @@ class DeviationMapView(Chart):
     def _angular_width(self, deformation: Deformation) -> float:
         if deformation.kind in {DeformationKind.OVALITY, DeformationKind.BOW}:
             return 2 * np.pi
-        radius = float(self.state.element.radius_at(deformation.chainage))
+        element = self.state.element
+        radius = 0.0 if element is None else float(element.radius_at(deformation.chainage))
         width = deformation.width / radius if radius > 0 else np.nan
         return width if np.isfinite(width) else 2 * np.pi
 
@@ -191,36 +193,23 @@ class DeviationMapView(Chart):
             self.spot_clicked.emit(*self._place(position))
 
     def _hover(self, plot: pg.PlotItem | None, position: QPointF) -> None:
-        is_inside = plot is not None and self._grid is not None
-        self.readout.setText(self._text_at(position) if is_inside else "")
-        place = self._place(position) if is_inside else None
-        is_on_it = place is not None and self._grid.cell(*place) is not None
-        self.spot_hovered.emit(place if is_on_it else None)
+        grid = self._grid
+        if plot is None or grid is None:
+            self.readout.clear()
+            self.spot_hovered.emit(None)
+            return
+        place = self._place(position)
+        self.readout.setText(_text_of(grid, *place))
+        self.spot_hovered.emit(place if grid.cell(*place) is not None else None)
 
     def show_cursor(self, place: tuple[float, float] | None) -> None:
         """Show where another view's cursor is: chainage and clock, or nowhere."""
         if place is None or self._grid is None:
-            self.cursor.clear()
+            self.cursor_mark.clear()
             return
         chainage, clock = place
         pen = pg.mkPen(theme.colour("accent"), width=2)
-        self.cursor.setData([chainage], [float(np.rad2deg(clock_from(clock)))], pen=pen)
-
-    def _text_at(self, position: QPointF) -> str:
-        chainage, clock = self._place(position)
-        cell = self._grid.cell(chainage, clock)
-        if cell is None:
-            return ""
-        place = f"{chainage:.3f} m · {format_clock(clock)}"
-        n_points = int(self._grid.n_points[cell])
-        if not n_points:
-            return tr("{place} · not scanned").format(place=place)
-        value = 1000 * float(self._grid.deviation[cell])
-        side = tr("outward") if value > 0 else tr("inward")
-        size = format_measure(abs(value), unit="mm")
-        return tr("{place} · {size} {side} · {n_points} points").format(
-            place=place, size=size, side=side, n_points=n_points
-        )
+        self.cursor_mark.setData([chainage], [float(np.rad2deg(clock_from(clock)))], pen=pen)
 
 
 class ScaleStrip(QWidget):
@@ -254,6 +243,23 @@ class ScaleStrip(QWidget):
         painter.drawImage(QRectF(left, middle - 6, self.BAR, 12), image)
         painter.drawText(QPointF(left + self.BAR + SPACING, baseline), high)
         painter.end()
+
+
+def _text_of(grid: DeviationGrid, chainage: float, clock: float) -> str:
+    """What is said of a place on the map."""
+    cell = grid.cell(chainage, clock)
+    if cell is None:
+        return ""
+    place = f"{chainage:.3f} m · {format_clock(clock)}"
+    n_points = int(grid.n_points[cell])
+    if not n_points:
+        return tr("{place} · not scanned").format(place=place)
+    value = 1000 * float(grid.deviation[cell])
+    side = tr("outward") if value > 0 else tr("inward")
+    size = format_measure(abs(value), unit="mm")
+    return tr("{place} · {size} {side} · {n_points} points").format(
+        place=place, size=size, side=side, n_points=n_points
+    )
 
 
 def _is_inside(box: QRectF, at: QPointF) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtGui import QColor
 
 from pipecore.formatting import cell
@@ -11,7 +12,7 @@ from pipecore.geometry import Array
 from pipecore.inspection.radius_pattern import RadiusPattern, radius_pattern
 from pipecore.inspection.section import radius_is_measurable
 from pipecore.rules import MEASURE_TEXTS, DentLimit
-from pipecore.types import Element, Profiles
+from pipecore.types import Element, Profiles, Verdict
 from pipegui.i18n.texts import format_measure, label_of, tr
 from pipegui.plots.chart import faint
 from pipegui.plots.export import Table
@@ -58,7 +59,7 @@ def table_of(curves: Sequence[Curve]) -> Table:
     """The profiles of the elements, one after the other."""
     table: dict[str, list[str]] = {}
 
-    def put(title: str, values: Array, decimals: int) -> None:
+    def put(title: str, values: Array | NDArray[np.int32], decimals: int) -> None:
         table.setdefault(title, []).extend(cell(float(v), decimals) for v in values)
 
     for curve in curves:
@@ -126,5 +127,5 @@ def legend(
         parts.append(key_of("╍", data, "") + key_of("▒", faint(data, 1), scatter))
     if shows("limit") and limit is not None:
         text = tr("limit for dents {depth:.1f} mm").format(depth=1000 * limit.depth)
-        parts.append(key_of("╍", QColor(VERDICT["reject"]), text))
+        parts.append(key_of("╍", QColor(VERDICT[Verdict.REJECT]), text))
     return "&nbsp; ".join(parts)

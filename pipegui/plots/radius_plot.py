@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from pipecore.geometry import Array
 from pipecore.inspection.radius_pattern import profile_index_at
-from pipecore.types import Element, Profiles
+from pipecore.types import Element, Profiles, Verdict
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.model.document import ProfileKey
 from pipegui.plots import drawing
@@ -122,8 +122,8 @@ class RadiusPlot(Chart):
         self.shown_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
         self.key = QLabel(wordWrap=True)
         self.key.setMinimumWidth(1)
-        for widget in (self.stacks, self.x_axis):
-            self.header.addWidget(widget)
+        for choice in (self.stacks, self.x_axis):
+            self.header.addWidget(choice)
         self.header.addStretch(1)
         for widget in (self.pin, self.shown_button, self.menu_button):
             self.header.addWidget(widget)
@@ -237,7 +237,7 @@ class RadiusPlot(Chart):
             drawing.draw_line(self.radius, curve.x, moved, curve.colour, dashed=True)
         if self.shows("limit") and state.dent_limit is not None:
             lowest = curve.pattern_mm.fitted - 1000 * state.dent_limit.depth
-            red = QColor(VERDICT["reject"])
+            red = QColor(VERDICT[Verdict.REJECT])
             drawing.draw_line(self.radius, curve.x, self._level(curve, lowest), red, dashed=True)
         for one in (*self._pinned, curve):
             self._draw_curve(one, is_pinned=one is not curve)
@@ -276,8 +276,8 @@ class RadiusPlot(Chart):
             axis.setStyle(showValues=plot is lowest)
             axis.setLabel(title if plot is lowest else None)
             axis.showLabel(plot is lowest)
-        for title in self._titles:
-            title.setBrush(theme.colour("muted"))
+        for inside in self._titles:
+            inside.setBrush(theme.colour("muted"))
 
     def _draw_curve(self, curve: Curve, *, is_pinned: bool) -> None:
         profiles, pattern, bars = curve.profiles, curve.pattern_mm, self.shows("error_bars")
@@ -292,8 +292,8 @@ class RadiusPlot(Chart):
             level = self._level(curve, free)
             drawing.draw_points(self.radius, curve.x, level, violet, sd if bars else None, "d", 7)
         if self.shows("semi_minor"):
-            level, sd = self._level(curve, pattern.values), pattern.sd if bars else None
-            drawing.draw_points(self.radius, curve.x, level, curve.colour, sd, size=size)
+            level, error = self._level(curve, pattern.values), pattern.sd if bars else None
+            drawing.draw_points(self.radius, curve.x, level, curve.colour, error, size=size)
         for plot, values in (
             (self.offset, 1000 * profiles.centre_deviation),
             (self.ovality, 100 * profiles.ovality),
@@ -314,8 +314,8 @@ class RadiusPlot(Chart):
 
     def _mark_selected(self, curve: Curve) -> None:
         index = self.state.selected_index
-        rows = np.flatnonzero(curve.profiles.profile_index == index) if index is not None else []
-        if not len(rows):
+        rows = np.flatnonzero(curve.profiles.profile_index == index)
+        if index is None or not len(rows):
             return
         for plot in self.plots():
             drawing.draw_mark(plot, curve.x[rows[0]], float(self._values(plot, curve)[rows[0]]))

@@ -86,7 +86,8 @@ class SectionView(Chart):
         for button, step in ((self.back, -1), (self.ahead, 1)):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             button.clicked.connect(lambda _=False, step=step: self.step_requested.emit(step))
-        self.factor = QSlider(Qt.Orientation.Horizontal, minimum=1, maximum=MAX_FACTOR)
+        self.factor = QSlider(Qt.Orientation.Horizontal)
+        self.factor.setRange(1, MAX_FACTOR)
         self.factor.setMaximumWidth(96)
         self.factor.setAccessibleName(tr("Exaggeration"))
         self.factor.setToolTip(tr("Draws deviations from the undeformed contour larger"))
@@ -99,7 +100,8 @@ class SectionView(Chart):
         self.layer_button = self.tool_button(tr("What is drawn"), "tune-variant")
         self.layer_button.setMenu(self.layer_menu)
         self.layer_button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
-        for widget in (self.back, self.title, self.ahead):
+        title: tuple[QWidget, ...] = (self.back, self.title, self.ahead)
+        for widget in title:
             self.header.addWidget(widget)
         self.header.addStretch(1)
         for widget in (self.factor, self.factor_text, self.layer_button, self.menu_button):

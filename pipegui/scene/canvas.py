@@ -156,10 +156,15 @@ class Canvas(QVTKRenderWindowInteractor):
         if is_wanted:
             self._shading = vtkEDLShading()
             self._shading.SetDelegatePass(vtkRenderStepsPass())
-        else:
+            self.layers[0].SetPass(self._shading)
+        elif self._shading is not None:
+            self._stop_shading()
+
+    def _stop_shading(self) -> None:
+        if self._shading is not None:
+            self.layers[0].SetPass(None)  # type: ignore[arg-type]  # takes the pass away
             self._shading.ReleaseGraphicsResources(self.GetRenderWindow())
             self._shading = None
-        self.layers[0].SetPass(self._shading)
 
     def _place_camera(self) -> None:
         pose = self.pose
@@ -173,9 +178,9 @@ class Canvas(QVTKRenderWindowInteractor):
             position = pose.focus - (pose.distance + away) * pose.forward
         self._camera.SetParallelProjection(self.is_parallel)
         self._camera.SetParallelScale(self._parallel_scale)
-        self._camera.SetFocalPoint(pose.focus)
-        self._camera.SetPosition(position)
-        self._camera.SetViewUp(pose.up)
+        self._camera.SetFocalPoint(*pose.focus)
+        self._camera.SetPosition(*position)
+        self._camera.SetViewUp(*pose.up)
         if len(bounds):
             self.layers[0].ResetCameraClippingRange([*np.stack([low, high]).T.ravel()])
 
@@ -187,7 +192,7 @@ class Canvas(QVTKRenderWindowInteractor):
     @property
     def aspect(self) -> float:
         """Width over height."""
-        return self.width() / max(self.height(), 1)
+        return float(self.width() / max(self.height(), 1))
 
     def projection(self) -> Projection:
         """The present mapping from local coordinates to the widget's pixels."""
@@ -332,16 +337,13 @@ class Canvas(QVTKRenderWindowInteractor):
         self._settling.stop()
         self.point_under, self.grab, self._held = lambda _: None, lambda _: None, None
         window = self.GetRenderWindow()
-        if self._shading is not None:
-            self.layers[0].SetPass(None)
-            self._shading.ReleaseGraphicsResources(window)
-            self._shading = None
+        self._stop_shading()
         for layer in self.layers:
             layer.RemoveAllViewProps()
             if window is not None:
                 window.RemoveRenderer(layer)
         self.layers = []
-        closed = super().close()
+        closed = bool(super().close())
         # The window may outlive its closing in Python; what VTK holds must not.
         self._RenderWindow = self._Iren = None
         return closed

@@ -56,8 +56,8 @@ def drag(
     """
     anchor = handles(box)[handle]
     if handle == MIDDLE:
-        step = _in_picture(projection, anchor, cursor) - _in_picture(projection, anchor, start)
-        low, high = corners(box) + step
+        move = _in_picture(projection, anchor, cursor) - _in_picture(projection, anchor, start)
+        low, high = corners(box) + move
         return replace(box, low=_point(low), high=_point(high))
     axis, side = divmod(handle, 2)
     step = _along(projection, anchor, axis, cursor) - _along(projection, anchor, axis, start)
@@ -110,7 +110,7 @@ class BoxFrame:
         mapper.SetInputData(shapes.box_lines(*corners(box)))
         self._actor = vtkActor()
         self._actor.SetMapper(mapper)
-        self._actor.GetProperty().SetColor(colour)
+        self._actor.GetProperty().SetColor(*colour)
         self._actor.GetProperty().SetLineWidth(width)
         self._actor.GetProperty().LightingOff()
         self._layer.AddActor(self._actor)

@@ -33,7 +33,7 @@ SOUND = (157, 190, 217)
 """Where a pipe has no deformation, in the colours of the verdicts."""
 PROFILE_COLOURS = QUALITATIVE[[0, 1]]
 
-Rows = NDArray[np.intp] | slice
+Rows = NDArray[np.integer] | slice
 ALL = slice(None)
 SMALL_BLOCK = 65_536
 
@@ -68,7 +68,14 @@ def colour_points(
 ) -> Colours:
     """Return the colours of some points of the cloud or of all, uint8, shape (n, 3)."""
     colour_by = effective(view.colour_by, cloud, result)
-    return _COLOURING[colour_by](_Asked(cloud, result, view, MUTED[dark], rows))
+    asked = _Asked(cloud, view, MUTED[dark], rows)
+    if colour_by is ColourBy.RGB and cloud.rgb is not None:
+        return cloud.rgb[rows]
+    if colour_by is ColourBy.INTENSITY and cloud.intensity is not None:
+        return _by_intensity(asked, cloud.intensity)
+    if result is None or colour_by not in _BY_RESULT:
+        return _by_height(asked)
+    return _BY_RESULT[colour_by](asked, result)
 
 
 def visible_points(
@@ -84,7 +91,7 @@ def visible_points(
     """
     seen = None if box is None else points_in(box, cloud.xyz[rows])
     if result is not None and hidden:
-        shown = np.ones(len(result.elements) + 1, np.bool_)
+        shown = np.ones(_n_ids(result), np.bool_)
         shown[[i for i in hidden if i < len(shown)]] = False
         is_shown = shown[result.element_id[rows]]
         seen = is_shown if seen is None else seen & is_shown
@@ -114,6 +121,15 @@ def visible_elements(result: Result | None, hidden: frozenset[int]) -> tuple[Ele
     return tuple(e for e in result.elements if e.element_id not in hidden)
 
 
+def _n_ids(result: Result) -> int:
+    """Length of a table by the ids of elements: ids of deleted ones leave gaps."""
+    return max((e.element_id for e in result.elements), default=NO_ID) + 1
+
+
+def _look_up_ids(table: Colours, ids: NDArray[np.integer]) -> Colours:
+    return np.asarray(table[ids])
+
+
 def _ids(result: Result, colour_by: ColourBy) -> NDArray[np.int32]:
     return result.segment_id if colour_by is ColourBy.SEGMENT else result.element_id
 
@@ -136,18 +152,13 @@ class _Asked:
     """What is to be coloured, and how."""
 
     cloud: PointCloud
-    result: Result
     view: ViewOptions
     muted: tuple[int, int, int]
     rows: Rows
 
 
-def _by_rgb(asked: _Asked) -> Colours:
-    return asked.cloud.rgb[asked.rows]
-
-
-def _by_intensity(asked: _Asked) -> Colours:
-    share = _share(asked.cloud.intensity[asked.rows], intensity_limits(asked.cloud, asked.view))
+def _by_intensity(asked: _Asked, intensity: NDArray[np.floating]) -> Colours:
+    share = _share(intensity[asked.rows], intensity_limits(asked.cloud, asked.view))
     return look_up(INTENSITY, share, asked.muted)
 
 
@@ -156,61 +167,63 @@ def _by_height(asked: _Asked) -> Colours:
     return look_up(HEIGHT, share, asked.muted)
 
 
-def _by_deviation(asked: _Asked) -> Colours:
-    deviation_mm = 1000 * asked.result.deviation[asked.rows]
+def _by_deviation(asked: _Asked, result: Result) -> Colours:
+    deviation_mm = 1000 * result.deviation[asked.rows]
     return deviation_colours(deviation_mm, asked.view.deviation_limit_mm, asked.muted)
 
 
-def _by_kind(asked: _Asked) -> Colours:
-    kinds = [KIND_COLOUR[e.kind] for e in asked.result.elements]
-    table = np.array([asked.muted, *kinds], np.uint8)
-    return table[asked.result.element_id[asked.rows]]
+def _by_kind(asked: _Asked, result: Result) -> Colours:
+    table = np.full((_n_ids(result), 3), asked.muted, np.uint8)
+    for element in result.elements:
+        table[element.element_id] = KIND_COLOUR[element.kind]
+    return _look_up_ids(table, result.element_id[asked.rows])
 
 
-def _by_id(asked: _Asked) -> Colours:
-    table = QUALITATIVE[_apart(asked.result, asked.cloud, asked.view.colour_by)]
+def _by_id(asked: _Asked, result: Result) -> Colours:
+    table = QUALITATIVE[_apart(result, asked.cloud, asked.view.colour_by)]
     table[NO_ID] = asked.muted
-    return table[_ids(asked.result, asked.view.colour_by)[asked.rows]]
+    return _look_up_ids(table, _ids(result, asked.view.colour_by)[asked.rows])
 
 
-def _by_verdict(asked: _Asked) -> Colours:
+def _by_verdict(asked: _Asked, result: Result) -> Colours:
     """Deformed stretches in the colour of their verdict, the worst over the others."""
-    table = np.full((len(asked.result.elements) + 1, 3), SOUND, np.uint8)
+    table = np.full((_n_ids(result), 3), SOUND, np.uint8)
     table[NO_ID] = asked.muted
-    ids, xyz = asked.result.element_id[asked.rows], asked.cloud.xyz[asked.rows]
+    ids, xyz = result.element_id[asked.rows], asked.cloud.xyz[asked.rows]
     colours = table[ids]
-    for deformation in reversed(by_verdict(asked.result)):
+    for deformation in reversed(by_verdict(result)):
         at = np.flatnonzero(ids == deformation.element_id)
-        axis = asked.result.element(deformation.element_id).axis
+        axis = result.element(deformation.element_id).axis
         chainage, _, _ = axis.pipe_coordinates(xyz[at].astype(np.float64))
         low, high = deformation.chainage_start, deformation.chainage_end
         colours[at[(chainage >= low) & (chainage <= high)]] = rgb(VERDICT[deformation.verdict])
     return colours
 
 
-def _by_profile(asked: _Asked) -> Colours:
+def _by_profile(asked: _Asked, result: Result) -> Colours:
     """Colours that alternate from profile to profile; fainter where there is no segment.
 
     Where one profile is shown alone, the others are muted; see `profile_points` for it.
     """
-    muted, ids = np.array(asked.muted, np.uint8), asked.result.segment_id[asked.rows]
-    stack = stack_of(asked.result, asked.view.shown_stack)
+    muted, ids = np.array(asked.muted, np.uint8), result.segment_id[asked.rows]
+    stack = stack_of(result, asked.view.shown_stack)
     if stack is None or asked.view.shown_profile is not None:
         return np.broadcast_to(muted, (len(ids), 3)).copy()
     faint = (PROFILE_COLOURS.astype(np.int32) + 2 * muted.astype(np.int32)) // 3
     table = np.stack([faint, PROFILE_COLOURS]).astype(np.uint8)
     parity = stack.profile_index(asked.cloud.xyz[asked.rows]) % 2
-    return table[(ids != NO_ID).astype(np.intp), parity]
+    return np.asarray(table[(ids != NO_ID).astype(np.intp), parity])
 
 
 def profile_rows(cloud: PointCloud, stack: Stack, profile_index: int) -> NDArray[np.intp]:
     """Return the indices in the cloud of the points in one profile."""
     start = stack.offset + profile_index * stack.width
-    direction = stack.direction.astype(cloud.xyz.dtype)
+    # In the points' own type: as float64 they would take room twice over.
+    direction: NDArray[np.floating] = stack.direction.astype(cloud.xyz.dtype)
     # In blocks: beside a large cloud there is no room for a number for each point.
     found = []
     for first in range(0, len(cloud), BLOCK):
-        along = cloud.xyz[first : first + BLOCK] @ direction
+        along = np.dot(cloud.xyz[first : first + BLOCK], direction)
         found.append(first + np.flatnonzero((along >= start) & (along < start + stack.width)))
     return np.concatenate(found)
 
@@ -219,7 +232,7 @@ def profile_colours(cloud: PointCloud, result: Result, rows: NDArray[np.intp]) -
     """Return the colours of a profile's points, each as its element, grey where there is none."""
     table = QUALITATIVE[_apart(result, cloud, ColourBy.ELEMENT)]
     table[NO_ID] = NO_ELEMENT
-    return table[result.element_id[rows]]
+    return _look_up_ids(table, result.element_id[rows])
 
 
 def stack_of(result: Result, stack_id: int) -> Stack | None:
@@ -227,10 +240,7 @@ def stack_of(result: Result, stack_id: int) -> Stack | None:
     return next((s for s in result.stacks if s.stack_id == stack_id), None)
 
 
-_COLOURING = {
-    ColourBy.RGB: _by_rgb,
-    ColourBy.INTENSITY: _by_intensity,
-    ColourBy.HEIGHT: _by_height,
+_BY_RESULT = {
     ColourBy.DEVIATION: _by_deviation,
     ColourBy.KIND: _by_kind,
     ColourBy.SEGMENT: _by_id,

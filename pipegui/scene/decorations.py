@@ -138,33 +138,36 @@ class Decorations:
     def _highlight(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         self._accented = {}
         element = selected_element(state)
-        if element is None:
+        cloud, result = state.cloud, state.result
+        if element is None or cloud is None or result is None:
             return
         accent = self._tint("accent")
-        colour_by = effective(state.view.colour_by, state.cloud, state.result)
+        colour_by = effective(state.view.colour_by, cloud, result)
         if colour_by in ACCENT_POINTS and state.view.show_points:
-            rows = np.flatnonzero(state.result.element_id == element.element_id)
+            rows = np.flatnonzero(result.element_id == element.element_id)
             for moving, limit in MAX_HIGHLIGHTED.items() if len(rows) else ():
                 thinned = rows[:: -(-len(rows) // limit)]
-                self._accented[moving] = _points(state.cloud.xyz[thinned], accent)
+                self._accented[moving] = _points(cloud.xyz[thinned], accent)
                 yield 0, self._accented[moving]
-        marked = [e for e in state.result.elements if e.element_id in state.selection.others]
+        marked = [e for e in result.elements if e.element_id in state.selection.others]
         yield 1, _lines(shapes.axis_lines((element, *marked)), accent, 2.5)
         for each in (element, *marked):
             yield 1, _lines(shapes.end_rings(each), accent, 2.0)
 
     def _stack_profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         """The one profile of a stack: its curves in their colours, and its ellipses."""
-        result, view = state.result, state.view
-        if result is None or view.shown_profile is None or view.colour_by is not ColourBy.PROFILE:
+        cloud, result, view = state.cloud, state.result, state.view
+        if cloud is None or result is None or view.shown_profile is None:
+            return
+        if view.colour_by is not ColourBy.PROFILE:
             return
         stack = stack_of(result, view.shown_stack)
         if stack is None:
             return
-        rows = profile_rows(state.cloud, stack, view.shown_profile)
+        rows = profile_rows(cloud, stack, view.shown_profile)
         rows = rows[:: -(-len(rows) // MAX_IN_PROFILE) or 1]
-        xyz = np.ascontiguousarray(state.cloud.xyz[rows], np.float32)
-        points = point_actor(xyz, profile_colours(state.cloud, result, rows))
+        xyz = np.ascontiguousarray(cloud.xyz[rows], np.float32)
+        points = point_actor(xyz, profile_colours(cloud, result, rows))
         points.GetProperty().SetPointSize(3.0)
         yield 1, points
         table = result.profiles
@@ -227,7 +230,8 @@ def _surface(mesh: pv.PolyData, colour: QColor) -> vtkActor:
 
 
 def _points(xyz: np.ndarray, colour: QColor) -> vtkActor:
-    colours = np.broadcast_to(np.array(colour.getRgb()[:3], np.uint8), (len(xyz), 3)).copy()
+    shade = np.array([colour.red(), colour.green(), colour.blue()], np.uint8)
+    colours = np.broadcast_to(shade, (len(xyz), 3)).copy()
     return point_actor(np.ascontiguousarray(xyz, np.float32), colours)
 
 

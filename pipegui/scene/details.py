@@ -25,7 +25,7 @@ def in_picture(xyz: Floats, projection: Projection, size: tuple[int, int]) -> Ma
     u, v, depth, w = projection.matrix.astype(np.float32) @ np.vstack(
         [xyz.T.astype(np.float32), np.ones(len(xyz), np.float32)]
     )
-    inside = (depth > 0) & (w > 0)
+    inside: Mask = (depth > 0) & (w > 0)
     for pixel, length in ((u, size[0]), (v, size[1])):
         inside &= (pixel >= 0) & (pixel <= length * w)
     return inside

@@ -7,11 +7,12 @@ path. Whoever imports the plotter afterwards gets it as ever.
 import sys
 from importlib import import_module
 from importlib.util import find_spec, module_from_spec
+from typing import Any
 
 NAME = "pyvistaqt"
 
 
-def _load() -> type:
+def _load() -> Any:
     if NAME in sys.modules:
         return import_module(f"{NAME}.rwi").QVTKRenderWindowInteractor
     spec = find_spec(NAME)

@@ -175,7 +175,8 @@ class Layers(QObject):
             return rows_of(self._visible(box))
         rows = Spread(len(state.cloud)).rows(0, AT_ONCE)
         hidden = state.view.hidden_elements
-        return rows[visible_points(state.cloud, state.result, hidden, box, rows)].astype(np.int32)
+        seen = visible_points(state.cloud, state.result, hidden, box, rows)
+        return (rows if seen is None else rows[seen]).astype(np.int32)
 
     def _colour(self, rows: NDArray[np.int32]) -> Colours:
         state = self._state

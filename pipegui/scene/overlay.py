@@ -273,6 +273,7 @@ class Overlay(QWidget):
         return box
 
     def _draw_scale(self, painter: QPainter, legend: Legend, corner: QPointF) -> None:
+        assert legend.scale is not None
         strip = np.ascontiguousarray(legend.scale[::-1])
         image = QImage(strip.data, 1, len(strip), 3, QImage.Format.Format_RGB888)
         bar = QRectF(corner.x(), corner.y(), SCALE_WIDTH, SCALE_HEIGHT)
@@ -307,12 +308,12 @@ class Overlay(QWidget):
         names: list[QRectF] = []
         axes = zip(np.eye(3), "ENH", strict=True)
         for axis, name in sorted(axes, key=lambda a: a[0] @ pose.forward):
-            tip = QPointF(axis @ pose.right, -(axis @ pose.up))
+            tip = QPointF(float(axis @ pose.right), -float(axis @ pose.up))
             fade = QColor(self._tint("text"))
             fade.setAlphaF(1.0 if axis @ pose.forward < 0.1 else 0.55)
             painter.setPen(QPen(fade, 1.6))
-            painter.drawLine(middle, middle + TRIAD_PX * tip)
-            at = middle + (TRIAD_PX + 9) * tip
+            painter.drawLine(middle, middle + tip * TRIAD_PX)
+            at = middle + tip * (TRIAD_PX + 9)
             box = QRectF(at.x() - 8, at.y() - 8, 16, 16)
             is_free = not any(box.intersects(other) for other in names)
             if is_free and np.hypot(tip.x(), tip.y()) > 0.25:

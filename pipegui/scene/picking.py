@@ -15,7 +15,15 @@ LAYER_PX = 10.0
 """Points whose depths differ by less than this on screen count as one surface."""
 
 
-def _find_near(xyz, matrix, cursor, radius, rows, depths, distances):
+def _find_near(
+    xyz: NDArray[np.floating],
+    matrix: Array,
+    cursor: Array,
+    radius: float,
+    rows: NDArray[np.int64],
+    depths: Array,
+    distances: Array,
+) -> int:
     """Fill the three arrays with the points within `radius` of `cursor`; return their number.
 
     Points for which there is no room are counted only. Serial on purpose: numba's plain
@@ -50,7 +58,8 @@ def _compiled() -> Callable[..., int]:
     """Return the kernel as numba makes it, which the start of the window does not wait for."""
     from numba import njit  # noqa: PLC0415
 
-    return njit(cache=True, nogil=True)(_find_near)
+    kernel: Callable[..., int] = njit(cache=True, nogil=True)(_find_near)
+    return kernel
 
 
 def points_near(

@@ -271,4 +271,4 @@ def estimate_spacing(xyz: Floats, n_sampled: int = 50_000) -> float:
     # On a surface, n points are √(n/m) times as close as m of them. The nearest of points
     # strewn at random is half the mean spacing away.
     thinned = np.sqrt(len(sample) / len(xyz))
-    return max(2 * float(np.median(distances[:, 1])) * thinned, 1e-4)
+    return float(max(2 * np.median(distances[:, 1]) * thinned, 1e-4))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
 from pipecore.geometry import Array
 
@@ -85,6 +86,6 @@ class Projection:
         return origin, direction
 
 
-def as_array(vtk_matrix: object) -> NDArray[np.float64]:
+def as_array(vtk_matrix: vtkMatrix4x4) -> NDArray[np.float64]:
     """Return a vtkMatrix4x4 as an array."""
     return np.array([[vtk_matrix.GetElement(i, j) for j in range(4)] for i in range(4)])

@@ -62,8 +62,8 @@ def outline(elements: tuple[Element, ...]) -> Array:
         if e.kind is ElementKind.SPHERE:
             points.append(e.centre + e.radius * np.vstack([np.eye(3), -np.eye(3)]))
             continue
-        s, clock = np.meshgrid(_chainages(e), np.linspace(0, 2 * np.pi, 8, endpoint=False))
-        s, clock = s.ravel(), clock.ravel()
+        grid = np.meshgrid(_chainages(e), np.linspace(0, 2 * np.pi, 8, endpoint=False))
+        s, clock = (values.ravel() for values in grid)
         points.append(surface_points(e.axis, s, e.radius_at(s), clock))
     return np.concatenate(points)
 

@@ -208,7 +208,8 @@ class SceneView(QWidget):
         """Go where the camera was; stay if that is not told."""
         focus, look = np.array(camera.get("focus", ())), camera.get("look", ())
         if focus.shape == (3,) and len(look) == 3 and look[0] > 0:
-            self.canvas.fly_to(Pose(focus, *look), fly=False)
+            distance, heading, elevation = look
+            self.canvas.fly_to(Pose(focus, distance, heading, elevation), fly=False)
 
     def mark_spot(self, spot: Array | None) -> None:
         """Show where another view's cursor is, in local coordinates; None for nowhere."""
@@ -217,8 +218,8 @@ class SceneView(QWidget):
 
     def mark_profile(self, profile: Profiles | None) -> None:
         """Show which profile another view's cursor is at, a table of one row; None for none."""
-        rings = shapes.ellipses(profile) if profile is not None else ()
-        self.overlay.ring = rings[0] if len(rings) else None
+        rings = list(shapes.ellipses(profile)) if profile is not None else []
+        self.overlay.ring = rings[0] if rings else None
         self.overlay.update()
 
     def view_direction(self) -> Array:
@@ -298,7 +299,7 @@ class SceneView(QWidget):
         index = self.layers.pick(position, quick=True)
         if index < 0 or self._state.cloud is None:
             return None
-        return self._state.cloud.xyz[index].astype(np.float64)
+        return np.asarray(self._state.cloud.xyz[index], np.float64)
 
     def _click(self, position: QPointF) -> None:
         # What is clicked is in view: the camera stays unless it sees too little of it.

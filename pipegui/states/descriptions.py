@@ -303,9 +303,7 @@ def _of_deformation(
     rule = tr("By the rule “{rule}”").format(rule=deformation.rule)
     yield Property(tr("Verdict"), tr(verdict), str(verdict), hint=rule, verdict=verdict)
     is_bulge = deformation.kind is DeformationKind.BULGE
-    name, of_od = (
-        (tr("Height"), tr("Height of OD")) if is_bulge else (tr("Depth"), tr("Depth of OD"))
-    )
+    name, of_od = (tr("Height"), tr("Height / OD")) if is_bulge else (tr("Depth"), tr("Depth / OD"))
     yield _measure(name, deformation.depth, deformation.depth_sd)
     yield _measure(of_od, deformation.depth * share, deformation.depth_sd * share, unit="%")
     size = f"{1000 * deformation.length:.0f} × {1000 * deformation.width:.0f}"

@@ -35,7 +35,8 @@ BLOCK = 1_000_000
 
 def rgb(hexadecimal: str) -> tuple[int, int, int]:
     """Return "#rrggbb" as three numbers from 0 to 255."""
-    return tuple(int(hexadecimal[i : i + 2], 16) for i in (1, 3, 5))
+    red, green, blue = (int(hexadecimal[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue
 
 
 def _table(stops: list[str], n_colours: int = 256) -> Colours:

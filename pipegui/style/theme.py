@@ -147,7 +147,8 @@ def _tinted(name: str, tint: str) -> QIcon:
     shade = tint if tint.startswith("#") else colour(tint or "text").name()
     disabled = colour("muted")
     disabled.setAlpha(110)
-    return qtawesome.icon(f"mdi6.{name}", color=shade, color_disabled=disabled)
+    drawn: QIcon = qtawesome.icon(f"mdi6.{name}", color=shade, color_disabled=disabled)
+    return drawn
 
 
 def set_icon(target: QAbstractButton | QAction, name: str, tint: str = "") -> None:
@@ -159,10 +160,10 @@ def set_icon(target: QAbstractButton | QAction, name: str, tint: str = "") -> No
 
 def refresh_icons(window: QWidget) -> None:
     """Draw the icons that `set_icon` gave in the colours of the present scheme."""
-    for kind in (QAbstractButton, QAction):
-        for target in window.findChildren(kind):
-            if name := target.property("iconName"):
-                target.setIcon(icon(name, target.property("iconTint")))
+    targets: list[QAbstractButton | QAction] = [*window.findChildren(QAbstractButton)]
+    for target in (*targets, *window.findChildren(QAction)):
+        if name := target.property("iconName"):
+            target.setIcon(icon(name, target.property("iconTint")))
 
 
 def verdict_icon(verdict: Verdict) -> QIcon:

@@ -50,7 +50,7 @@ class ToolBar(QToolBar):
         self.colour.setSizeAdjustPolicy(QuietComboBox.SizeAdjustPolicy.AdjustToContents)
         self.colour.currentIndexChanged.connect(self._tell_colour)
         self.limit = QuietSpinBox()
-        self.limit.setAccessibleName(tr("Deviation limits"))
+        self.limit.setAccessibleName(tr("Deviation range"))
         self.limit.setToolTip(tr("Deviations from − to + this are told apart by colour"))
         self.limit.setRange(0.5, 500)
         self.limit.setPrefix("± ")
@@ -58,7 +58,7 @@ class ToolBar(QToolBar):
         self.limit.valueChanged.connect(self._tell_limit)
         self.addWidget(QLabel(tr("Colour by")))
         self.addWidget(self.colour)
-        self._limit_label = self.addWidget(QLabel(tr("Limits")))
+        self._limit_label = self.addWidget(QLabel(tr("Range")))
         self._limit_action = self.addWidget(self.limit)
         self.ends = [QuietSpinBox() for _ in range(2)]
         self._end_actions: list[QAction] = []

@@ -48,7 +48,8 @@ def copied():
 
 
 def test_that_the_models_keep_qts_rules_while_reviews_come_and_go(qtbot):
-    model, proxy = DeformationModel(), DeformationFilter()
+    model = DeformationModel()
+    proxy = DeformationFilter(model)
     proxy.setSourceModel(model)
     testers = [QAbstractItemModelTester(m, STRICT) for m in (model, proxy)]
     model.set_result(RESULT)

@@ -164,7 +164,8 @@ def test_that_showing_a_selection_is_not_told_as_a_choice(qtbot, document):
 
 
 def test_that_the_deformation_models_keep_qts_rules(qtbot):
-    model, proxy = DeformationModel(), DeformationFilter()
+    model = DeformationModel()
+    proxy = DeformationFilter(model)
     proxy.setSourceModel(model)
     testers = [QAbstractItemModelTester(m, STRICT) for m in (model, proxy)]
     model.set_result(make_result())

@@ -366,10 +366,10 @@ def test_that_hovering_a_point_of_the_section_tells_where_on_the_pipe_it_is(sect
 def test_that_the_map_shows_the_cursor_of_the_3d_view(qtbot):
     plot = shown(qtbot, DeviationMapView(), states(Selection(1, 2)).map)
     plot.show_cursor((0.8, np.deg2rad(300)))
-    assert plot.cursor.getData()[0] == pytest.approx([0.8])
-    assert plot.cursor.getData()[1] == pytest.approx([-60])
+    assert plot.cursor_mark.getData()[0] == pytest.approx([0.8])
+    assert plot.cursor_mark.getData()[1] == pytest.approx([-60])
     plot.show_cursor(None)
-    assert len(plot.cursor.getData()[0]) == 0
+    assert len(plot.cursor_mark.getData()[0]) == 0
 
 
 def test_that_a_spot_on_the_surface_and_its_point_are_one():

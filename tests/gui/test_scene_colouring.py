@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipecore.editing import delete_elements
 from pipecore.formatting import MINUS
 from pipegui.model import commands, view_commands
 from pipegui.model.colour_limits import shown_limits
@@ -300,3 +301,16 @@ def test_that_a_profile_holds_the_points_of_its_slab_and_colours_them_by_element
 def test_that_all_else_is_muted_where_one_profile_is_shown():
     colours = colours_by(ColourBy.PROFILE, shown_stack=1, shown_profile=40)
     assert (colours == MUTED[False]).all()
+
+
+@pytest.mark.parametrize("colour_by", [ColourBy.KIND, ColourBy.VERDICT, ColourBy.ELEMENT])
+def test_that_after_a_deletion_the_others_keep_their_colours(colour_by):
+    """Ids of deleted elements leave gaps, so places in the result are no ids."""
+    view, left = ViewOptions(colour_by=colour_by), delete_elements(RESULT, [1])
+    others = (RESULT.element_id != 1) & (RESULT.element_id != 0)
+    before, after = (colour_points(CLOUD, result, view) for result in (RESULT, left))
+    if colour_by is not ColourBy.ELEMENT:  # whose colours are dealt out anew
+        assert np.array_equal(after[others], before[others])
+    last = left.elements[-1].element_id
+    hidden = visible_points(CLOUD, left, frozenset({last}))
+    assert np.array_equal(hidden, left.element_id != last)

@@ -296,7 +296,8 @@ def _portions(result: Result, element_ids: set[int]) -> Iterator[set[int]]:
 
 def _rows_of_elements(result: Result, element_ids: set[int]) -> dict[int, NDArray[np.intp]]:
     """Rows of the points of some elements, found in one pass over the cloud."""
-    is_wanted = np.zeros(len(result.elements) + 1, np.bool_)
+    # Ids of elements that were deleted leave gaps.
+    is_wanted = np.zeros(max(e.element_id for e in result.elements) + 1, np.bool_)
     is_wanted[list(element_ids)] = True
     n = len(result.element_id)
     rows = np.concatenate(

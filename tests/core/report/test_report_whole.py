@@ -12,6 +12,7 @@ import pytest
 
 import pipecore.report
 import pipecore.report.html
+from pipecore.editing import delete_elements
 from pipecore.errors import CancelledError, SettingsError, WriteError
 from pipecore.inspection.points import ElementPoints
 from pipecore.report import by_verdict, result_to_dict, summarise, write_html, write_report
@@ -349,3 +350,12 @@ def test_that_the_deepest_of_equal_verdicts_comes_first_and_the_unknown_last():
     accepted = replace(result.deformations[0], deformation_id=6, verdict=Verdict.ACCEPT)
     result = replace(result, deformations=(*result.deformations, unknown, accepted))
     assert [d.deformation_id for d in by_verdict(result)] == [1, 3, 4, 2, 5, 6]
+
+
+def test_that_a_report_can_be_written_after_an_element_was_deleted(tmp_path):
+    cloud, result = make_scan()
+    left = delete_elements(result, [1])
+    assert left.elements[-1].element_id > len(left.elements)
+    write_report(tmp_path / "report", cloud, left)
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert page.count("<figure>") == len(left.deformations)
