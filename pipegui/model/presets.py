@@ -55,14 +55,14 @@ class Presets:
     """The presets there are; the user's own lie in `folder`."""
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
 
     def every(self) -> list[Preset]:
         """Return the standard, those of the program, then the user's own by name."""
         shipped = sorted(resource("presets").glob("*.toml"))
         built_in = [Preset(_spoken(path), path, False, _first_comment(path)) for path in shipped]
         names = {preset.name for preset in built_in} | {STANDARD}
-        paths = sorted(self._folder.glob("*.toml"), key=lambda path: path.stem.casefold())
+        paths = sorted(self.folder.glob("*.toml"), key=lambda path: path.stem.casefold())
         own = [Preset(path.stem, path, True) for path in paths if path.stem not in names]
         return [Preset(STANDARD, description=mark("The program's defaults.")), *built_in, *own]
 
@@ -102,8 +102,8 @@ class Presets:
         """
         if objection := self.objection(name):
             raise SettingsError(objection)
-        self._folder.mkdir(parents=True, exist_ok=True)
-        path = self._folder / f"{name.strip()}.toml"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"{name.strip()}.toml"
         content = settings.to_dict()
         for key in OF_THE_SCAN:
             group, field = key.split(".")

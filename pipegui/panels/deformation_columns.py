@@ -36,7 +36,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Column:
+class TableColumn:
     """A column; `field` is the deformation's field that it shows, if it is one that can be nan."""
 
     key: str
@@ -69,7 +69,7 @@ def _number(
     *,
     field: str = "",
     is_shown_first: bool = True,
-) -> Column:
+) -> TableColumn:
     """A column of numbers; empty where the deformation's kind has no such number."""
 
     def text(row: Row) -> str:
@@ -77,7 +77,7 @@ def _number(
         does_apply = isfinite(number) or not field or field in row.deformation.not_measurable
         return format_measure(number, decimals=decimals) if does_apply else ""
 
-    return Column(
+    return TableColumn(
         key,
         title,
         text,
@@ -98,8 +98,8 @@ def _text(
     *,
     plain: Callable[[Row], str] | None = None,
     is_shown_first: bool = True,
-) -> Column:
-    return Column(
+) -> TableColumn:
+    return TableColumn(
         key,
         title,
         text,
@@ -111,8 +111,8 @@ def _text(
     )
 
 
-def _coordinate(key: str, title: str, axis: int) -> Column:
-    return Column(
+def _coordinate(key: str, title: str, axis: int) -> TableColumn:
+    return TableColumn(
         key,
         title,
         lambda row: format_coordinate(float(row.peak[axis])),
@@ -152,7 +152,7 @@ COLUMNS = (
     _text(
         "kind", mark("Kind"), lambda r: tr(r.deformation.kind), plain=lambda r: r.deformation.kind
     ),
-    Column(
+    TableColumn(
         "clock",
         mark("Clock"),
         lambda r: format_clock(r.deformation.clock),
@@ -169,7 +169,7 @@ COLUMNS = (
         3,
         mark("From the element’s start"),
     ),
-    Column(
+    TableColumn(
         "depth_mm",
         mark("Depth, mm"),
         lambda r: format_measure(1000 * r.deformation.depth, 1000 * r.deformation.depth_sd),
@@ -234,7 +234,7 @@ COLUMNS = (
         field="strain",
         is_shown_first=False,
     ),
-    Column(
+    TableColumn(
         "fitting",
         mark("Nearest fitting"),
         _fitting,
@@ -244,7 +244,7 @@ COLUMNS = (
         is_text=True,
         is_shown_first=False,
     ),
-    Column(
+    TableColumn(
         "next",
         mark("Next dent"),
         _neighbour,

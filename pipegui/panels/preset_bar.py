@@ -40,7 +40,7 @@ class PresetBar(QWidget):
             QuietComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon
         )
         self.choice.setMinimumContentsLength(8)
-        self.choice.activated.connect(self._choose)
+        self.choice.activated.connect(self.choose)
         self.save_button = _button("content-save-outline", tr("Keep these settings under a name"))
         self.save_button.clicked.connect(self._open)
         self.delete_button = _button("trash-can-outline", tr("Delete this preset of your own"))
@@ -108,7 +108,8 @@ class PresetBar(QWidget):
         self.choice.setToolTip(f"{described}\n{tip}".strip())
         self.delete_button.setEnabled(present is not None and present.is_own)
 
-    def _choose(self, row: int) -> None:
+    def choose(self, row: int) -> None:
+        """Take the preset in a row of the list."""
         if row >= len(self._listed):
             return
         try:

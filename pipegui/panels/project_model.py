@@ -74,7 +74,7 @@ class ProjectModel(QAbstractItemModel):
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._state = TreeState()
-        self._nodes: list[_Node] = []
+        self.nodes: list[_Node] = []
         self._root = self._add(_Node(NodeKind.ROOT, None))
 
     def apply(self, state: TreeState) -> bool:
@@ -82,7 +82,7 @@ class ProjectModel(QAbstractItemModel):
         before, self._state = self._state, state
         if _shown_of(state.scans) != _shown_of(before.scans):
             self.beginResetModel()
-            self._nodes = []
+            self.nodes = []
             self._root = self._add(_Node(NodeKind.ROOT, None))
             for index, scan in enumerate(state.scans):
                 self._add_scan(index, scan)
@@ -102,8 +102,8 @@ class ProjectModel(QAbstractItemModel):
     # Making the nodes
 
     def _add(self, node: _Node) -> _Node:
-        node.number = len(self._nodes)
-        self._nodes.append(node)
+        node.number = len(self.nodes)
+        self.nodes.append(node)
         if node.parent is not None:
             node.row = len(node.parent.children)
             node.parent.children.append(node)
@@ -167,25 +167,26 @@ class ProjectModel(QAbstractItemModel):
 
     # What Qt asks
 
-    def _node(self, index: Index) -> _Node:
-        return self._nodes[index.internalId()] if index.isValid() else self._root
+    def node(self, index: Index) -> _Node:
+        """Return what a row stands for."""
+        return self.nodes[index.internalId()] if index.isValid() else self._root
 
     def index(self, row: int, column: int, parent: Index = QModelIndex()) -> QModelIndex:  # noqa: B008
         """Return the index of a child."""
         if not self.hasIndex(row, column, parent):
             return QModelIndex()
-        return self.createIndex(row, column, self._node(parent).children[row].number)
+        return self.createIndex(row, column, self.node(parent).children[row].number)
 
     def parent(self, index: Index) -> QModelIndex:  # type: ignore[override]
         """Return the index of what contains a node."""
-        parent = self._node(index).parent
+        parent = self.node(index).parent
         if parent is None or parent is self._root:
             return QModelIndex()
         return self.createIndex(parent.row, NAME, parent.number)
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
         """Return the number of children."""
-        return 0 if parent.column() > 0 else len(self._node(parent).children)
+        return 0 if parent.column() > 0 else len(self.node(parent).children)
 
     def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, N802
         """Return the number of columns."""
@@ -204,7 +205,7 @@ class ProjectModel(QAbstractItemModel):
         if not index.isValid():
             return Qt.ItemFlag.NoItemFlags
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
-        node = self._node(index)
+        node = self.node(index)
         is_active = node.scan_index == self._state.active
         if index.column() == NAME and node.elements and is_active:
             flags |= Qt.ItemFlag.ItemIsUserCheckable
@@ -219,7 +220,7 @@ class ProjectModel(QAbstractItemModel):
         """Return what is shown of a node."""
         if not index.isValid():
             return None
-        node = self._node(index)
+        node = self.node(index)
         value: Any = None
         match role:
             case Role.EditRole if index.column() == NAME:
@@ -266,7 +267,7 @@ class ProjectModel(QAbstractItemModel):
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
         """Take a click on a check box or a new name: it becomes a command."""
         if role == Role.EditRole and self.flags(index) & Qt.ItemFlag.ItemIsEditable:
-            node = self._node(index)
+            node = self.node(index)
             # The rows are made anew for it, which the editor of this one must not live to see.
             tell = partial(self.renamed.emit, node.scan_index, node.kind, node.item_id, str(value))
             QTimer.singleShot(0, self, tell)
@@ -274,14 +275,14 @@ class ProjectModel(QAbstractItemModel):
         if role != Role.CheckStateRole or not self.flags(index) & Qt.ItemFlag.ItemIsUserCheckable:
             return False
         hide = Qt.CheckState(value) == Qt.CheckState.Unchecked
-        self.visibility_changed.emit(self._node(index).elements, hide)
+        self.visibility_changed.emit(self.node(index).elements, hide)
         return True
 
     # For the panel
 
     def what(self, index: Index) -> tuple[int, NodeKind, int]:
         """Return scan, kind and id of a node."""
-        node = self._node(index)
+        node = self.node(index)
         return node.scan_index, node.kind, node.item_id
 
     def index_of(self, scan_index: int, selection: Selection) -> QModelIndex:
@@ -294,7 +295,7 @@ class ProjectModel(QAbstractItemModel):
             wanted = self._run_node(scan_index, selection.run_id)
         else:
             return QModelIndex()
-        for node in self._nodes:
+        for node in self.nodes:
             if (node.scan_index, node.kind, node.item_id) == (scan_index, *wanted):
                 return self.createIndex(node.row, NAME, node.number)
         return QModelIndex()
@@ -307,13 +308,13 @@ class ProjectModel(QAbstractItemModel):
 
     def branches(self) -> list[QModelIndex]:
         """Return the nodes that hold others."""
-        nodes = [node for node in self._nodes[1:] if node.children]
+        nodes = [node for node in self.nodes[1:] if node.children]
         return [self.createIndex(node.row, NAME, node.number) for node in nodes]
 
     def spanned(self) -> list[QModelIndex]:
         """Return the nodes whose name may take the whole width."""
         kinds = (NodeKind.DEFORMATIONS, NodeKind.DEFORMATION)
-        nodes = [node for node in self._nodes if node.kind in kinds]
+        nodes = [node for node in self.nodes if node.kind in kinds]
         return [self.createIndex(node.row, NAME, node.number) for node in nodes]
 
 

@@ -56,9 +56,9 @@ class SettingsForm(QScrollArea):
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._applying = Applying()
         self._show: dict[str, Callable[[Any], None]] = {}
-        self._labels: dict[str, QLabel] = {}
-        self._resets: dict[str, QToolButton] = {}
-        self._group_resets: list[tuple[list[str], QToolButton]] = []
+        self.labels: dict[str, QLabel] = {}
+        self.resets: dict[str, QToolButton] = {}
+        self.group_resets: list[tuple[list[str], QToolButton]] = []
         self._specs = {key: spec for key, spec in iterate_fields() if key not in ELSEWHERE}
         body = QWidget()
         column = QVBoxLayout(body)
@@ -102,13 +102,13 @@ class SettingsForm(QScrollArea):
                 label.setBuddy(field)
                 for widget in (label, field):
                     widget.setToolTip(_help(spec))
-                self._labels[key] = label
+                self.labels[key] = label
                 row = QHBoxLayout()
                 row.setSpacing(0)
                 row.addWidget(field, 1)
                 tip = tr("Set “{label}” back to its default").format(label=tr(spec.label))
-                self._resets[key] = self._reset_button(tip, [key])
-                row.addWidget(self._resets[key])
+                self.resets[key] = self._reset_button(tip, [key])
+                row.addWidget(self.resets[key])
                 form.addRow(label, row)
             column.addLayout(form)
 
@@ -118,7 +118,7 @@ class SettingsForm(QScrollArea):
         button = self._reset_button(
             tr("Set all of “{title}” back to the defaults").format(title=title), keys
         )
-        self._group_resets.append((keys, button))
+        self.group_resets.append((keys, button))
         row = QHBoxLayout()
         row.addWidget(heading, 1)
         row.addWidget(button)
@@ -194,13 +194,13 @@ class SettingsForm(QScrollArea):
         with self._applying:
             for key, spec in self._specs.items():
                 self._show[key](settings.get(key))
-                font = self._labels[key].font()
+                font = self.labels[key].font()
                 font.setBold(settings.get(key) != spec.default)
-                self._labels[key].setFont(font)
+                self.labels[key].setFont(font)
         changed = {k for k, spec in self._specs.items() if settings.get(k) != spec.default}
-        for key, button in self._resets.items():
+        for key, button in self.resets.items():
             button.setVisible(key in changed)
-        for keys, button in self._group_resets:
+        for keys, button in self.group_resets:
             button.setVisible(len(keys) > 1 and not changed.isdisjoint(keys))
         self.reset.setEnabled(bool(changed))
         self.presets.apply(settings)

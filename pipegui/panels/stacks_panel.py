@@ -119,10 +119,10 @@ class StacksPanel(QWidget):
         self._empty = EmptyHint(
             tr("Open a scan to see in which directions it would be cut, and how well.")
         )
-        self._note = QLabel()
-        self._note.setProperty("muted", True)
-        self._note.setContentsMargins(theme.SPACING, 0, theme.SPACING, theme.SPACING // 2)
-        self._note.hide()
+        self.note = QLabel()
+        self.note.setProperty("muted", True)
+        self.note.setContentsMargins(theme.SPACING, 0, theme.SPACING, theme.SPACING // 2)
+        self.note.hide()
         self._lay_out()
         self._state = StacksState()
         self._list(self._state)
@@ -155,7 +155,7 @@ class StacksPanel(QWidget):
         column.addWidget(self.editor)
         column.addWidget(self.list, 1)
         column.addWidget(self._empty, 1)
-        column.addWidget(self._note)
+        column.addWidget(self.note)
 
     def apply(self, state: StacksState) -> None:
         """Show a state."""
@@ -211,8 +211,8 @@ class StacksPanel(QWidget):
         has_stacks = self.list.topLevelItemCount() > 0
         self.list.setVisible(has_stacks)
         self._empty.setVisible(not has_stacks)
-        self._note.setText(self._plan.message or self._share_text())
-        self._note.setVisible(bool(self._note.text()))
+        self.note.setText(self._plan.message or self._share_text())
+        self.note.setVisible(bool(self.note.text()))
         self._enable()
 
     def _share_text(self) -> str:

@@ -3,10 +3,10 @@
 import numpy as np
 
 from pipecore.geometry import Array
-from pipecore.inspection.section import PlaneEllipse
+from pipecore.inspection.section import SectionEllipse
 
 
-def ellipse_points(ellipse: PlaneEllipse, n: int = 181) -> Array:
+def ellipse_points(ellipse: SectionEllipse, n: int = 181) -> Array:
     """Return points along an ellipse, closed, shape (n, 2), metres."""
     t = np.linspace(0, 2 * np.pi, n)
     cos, sin = np.cos(ellipse.angle), np.sin(ellipse.angle)
@@ -16,7 +16,7 @@ def ellipse_points(ellipse: PlaneEllipse, n: int = 181) -> Array:
     return np.stack([u, v], axis=1)
 
 
-def exaggerate(points: Array, reference: PlaneEllipse, factor: float) -> Array:
+def exaggerate(points: Array, reference: SectionEllipse, factor: float) -> Array:
     """Return points (n, 2) with their distances from the reference times `factor`."""
     direction, distance, on_reference = reference.rays(points)
     moved = on_reference + factor * (distance - on_reference)

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QComboBox, QLabel, QSlider, QWidget
 
 from pipecore.formatting import cell
 from pipecore.geometry import Array
-from pipecore.inspection.section import PlaneEllipse
+from pipecore.inspection.section import SectionEllipse
 from pipegui.i18n.texts import count, mark, tr
 from pipegui.plots.chart import Chart, faint
 from pipegui.plots.exaggeration import ellipse_points
@@ -128,7 +128,7 @@ class PreviewView(Chart):
     def _ellipse(self, preview: "ProfilePreview", row: int) -> Array:
         centre, major, minor, angle = preview.ellipse_uv(row)
         place = float(centre[0]), float(centre[1])
-        return ellipse_points(PlaneEllipse(place, major, minor, angle)) @ upright(preview).T
+        return ellipse_points(SectionEllipse(place, major, minor, angle)) @ upright(preview).T
 
     def fit(self) -> None:
         """Show all points."""

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QLabel, QSlider, QToolButton, QWidget
 from pipecore.formatting import cell
 from pipecore.geometry import Array
 from pipecore.inspection.dimensions import measure_dimensions
-from pipecore.inspection.section import PlaneEllipse, Section
+from pipecore.inspection.section import Section, SectionEllipse
 from pipecore.types import OWN_STACK
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
 from pipegui.plots.chart import Chart, faint
@@ -199,14 +199,14 @@ class SectionView(Chart):
             self._draw_dimensions(section, factor)
         self._draw_curvature(section)
 
-    def _draw_contour(self, ellipse: PlaneEllipse, pen: object, factor: int) -> None:
+    def _draw_contour(self, ellipse: SectionEllipse, pen: object, factor: int) -> None:
         assert self.state.section is not None
         shown = ellipse_points(ellipse)
         if np.isfinite(shown).all():
             drawn = MM * exaggerate(shown, self.state.section.reference, factor)
             self.plot.plot(*drawn.T, pen=pen, antialias=True)
 
-    def _draw_clock(self, reference: PlaneEllipse) -> None:
+    def _draw_clock(self, reference: SectionEllipse) -> None:
         u, v = MM * np.asarray(reference.centre_uv)
         radius = MM * reference.semi_major
         muted = theme.colour("muted")
@@ -386,13 +386,13 @@ def _points_colour() -> QColor:
     return QColor(*QUALITATIVE[0].tolist())
 
 
-def _is_around(ellipse: PlaneEllipse, reference: PlaneEllipse) -> bool:
+def _is_around(ellipse: SectionEllipse, reference: SectionEllipse) -> bool:
     """Whether the reference's centre lies well inside an ellipse: else it has no rays to it."""
     offset = np.subtract(ellipse.centre_uv, reference.centre_uv)
     return bool(np.linalg.norm(offset) < 0.5 * ellipse.semi_minor)
 
 
-def _outward_anchor(place: Array, reference: PlaneEllipse) -> tuple[float, float]:
+def _outward_anchor(place: Array, reference: SectionEllipse) -> tuple[float, float]:
     """Where a label has its anchor so that it stands outside of a place on the contour."""
     u, v = place - np.asarray(reference.centre_uv)
     reach = max(abs(u), abs(v), 1e-9)

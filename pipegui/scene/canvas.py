@@ -71,7 +71,7 @@ class Canvas(QVTKRenderWindowInteractor):
         self.eye_dome: bool | None = None
         self._is_software: bool | None = None
         self._shading: vtkEDLShading | None = None
-        self._is_stale = True
+        self.is_stale = True
         self._press: QPointF | None = None
         self._last: QPointF | None = None
         self._is_drag = False
@@ -87,12 +87,12 @@ class Canvas(QVTKRenderWindowInteractor):
             layer.SetActiveCamera(self._camera)
             window.AddRenderer(layer)
         window.GetInteractor().Initialize()  # else it does not render
-        self._resting = QTimer(self, singleShot=True, interval=REST_MS)
-        self._resting.timeout.connect(self._rest)
+        self.rest_timer = QTimer(self, singleShot=True, interval=REST_MS)
+        self.rest_timer.timeout.connect(self._rest)
         self.seconds_to_draw = SETTLED_SECONDS
         """What a picture may take now, 0 while the camera moves."""
-        self._settling = QTimer(self, singleShot=True, interval=SETTLE_MS)
-        self._settling.timeout.connect(self._settle)
+        self.settle_timer = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self.settle_timer.timeout.connect(self._settle)
         self._flight = QVariantAnimation(self, duration=FLIGHT_MS, startValue=0.0, endValue=1.0)
         self._flight.setEasingCurve(QEasingCurve.Type.InOutCubic)
         self._flight.valueChanged.connect(self._fly_on)
@@ -104,7 +104,7 @@ class Canvas(QVTKRenderWindowInteractor):
 
     def draw(self) -> None:
         """Draw anew when Qt next paints."""
-        self._is_stale = True
+        self.is_stale = True
         self.update()
 
     def paintGL(self) -> None:  # noqa: N802
@@ -112,14 +112,14 @@ class Canvas(QVTKRenderWindowInteractor):
 
         The widget paints whenever anything over it changes; only `draw` makes VTK work.
         """
-        if not self._is_stale or self.GetRenderWindow() is None:
+        if not self.is_stale or self.GetRenderWindow() is None:
             self._in_paint = True  # pyvistaqt draws only where this is False
             try:
                 super().paintGL()
             finally:
                 self._in_paint = False
             return
-        self._is_stale = False
+        self.is_stale = False
         self._place_camera()
         self._shade()
         self.before_frame.emit()
@@ -131,7 +131,7 @@ class Canvas(QVTKRenderWindowInteractor):
     def resizeGL(self, width: int, height: int) -> None:  # noqa: N802
         """Draw anew in the new size."""
         super().resizeGL(width, height)
-        self._is_stale = True
+        self.is_stale = True
 
     @property
     def is_drawn(self) -> bool:
@@ -213,12 +213,12 @@ class Canvas(QVTKRenderWindowInteractor):
         """Put the camera there at once; draw quickly now and fully a moment later."""
         self.pose = pose
         self._set_moving()
-        self._resting.start()
+        self.rest_timer.start()
         self.draw()
 
     def _set_moving(self) -> None:
         self.is_moving, self.seconds_to_draw = True, 0.0
-        self._settling.stop()
+        self.settle_timer.stop()
         self.moved.emit()
 
     def fly_to(self, pose: Pose, *, fly: bool = True) -> None:
@@ -236,10 +236,10 @@ class Canvas(QVTKRenderWindowInteractor):
 
     def _rest(self) -> None:
         if QApplication.mouseButtons() & (LEFT | MIDDLE) and self._is_drag:
-            self._resting.start()
+            self.rest_timer.start()
             return
         self.is_moving, self.seconds_to_draw = False, REST_SECONDS
-        self._settling.start()
+        self.settle_timer.start()
         self.draw()
 
     def _settle(self) -> None:
@@ -250,7 +250,7 @@ class Canvas(QVTKRenderWindowInteractor):
     def settle_again(self) -> None:
         """Take what is drawn as new: it has changed while the camera rests."""
         if not self.is_moving:
-            self._settling.start()
+            self.settle_timer.start()
 
     # Mouse
 
@@ -333,8 +333,8 @@ class Canvas(QVTKRenderWindowInteractor):
     def close(self) -> bool:
         """Let go of VTK while its context is there."""
         self._flight.stop()
-        self._resting.stop()
-        self._settling.stop()
+        self.rest_timer.stop()
+        self.settle_timer.stop()
         self.point_under, self.grab, self._held = lambda _: None, lambda _: None, None
         window = self.GetRenderWindow()
         self._stop_shading()

@@ -10,7 +10,7 @@ from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stac
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.colour_limits import height_limits, intensity_limits
 from pipegui.model.document import Box, ColourBy, ViewOptions
-from pipegui.scene.neighbours import colour_apart, neighbouring_ids
+from pipegui.scene.colour_assignment import colour_apart, neighbouring_ids
 from pipegui.style.colour_maps import (
     BLOCK,
     HEIGHT,

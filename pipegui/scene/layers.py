@@ -83,7 +83,7 @@ class Layers(QObject):
         if is_other_subset:
             self._choose(cloud, view.clip_box)
         elif is_recoloured:
-            self.whole.set_colours(self._colour)
+            self.whole.set_colours(self.colour_rows)
         else:
             return
         self._end_close_up()
@@ -98,9 +98,9 @@ class Layers(QObject):
         self._search = None
         is_whole = box is None and not self._state.view.hidden_elements
         if is_whole or len(cloud) <= AT_ONCE:
-            self.whole.set_points(cloud, rows_of(self._visible(box)), self._colour)
+            self.whole.set_points(cloud, rows_of(self._visible(box)), self.colour_rows)
             return
-        self.whole.set_points(cloud, self._sample(box), self._colour)
+        self.whole.set_points(cloud, self._sample(box), self.colour_rows)
         self._search = lambda: rows_of(self._visible(box))
 
     def _begin_search(self, _: float) -> None:
@@ -111,7 +111,7 @@ class Layers(QObject):
 
     def _show_subset(self, rows: NDArray[np.int32]) -> None:
         if self._state.cloud is not None:
-            self.whole.set_points(self._state.cloud, rows, self._colour)
+            self.whole.set_points(self._state.cloud, rows, self.colour_rows)
             self._end_close_up()
             self._canvas.move_to(self._canvas.pose)
 
@@ -147,7 +147,7 @@ class Layers(QObject):
         """Draw what is in the box, of points that need not have been in it before."""
         if self._state.cloud is not None:
             self.preview.seconds_per_point = self.whole.seconds_per_point
-            self.preview.set_points(self._state.cloud, self._sample(None), self._colour)
+            self.preview.set_points(self._state.cloud, self._sample(None), self.colour_rows)
             self.preview.clip(box)
 
     def forget(self) -> None:
@@ -178,7 +178,8 @@ class Layers(QObject):
         seen = visible_points(state.cloud, state.result, hidden, box, rows)
         return (rows if seen is None else rows[seen]).astype(np.int32)
 
-    def _colour(self, rows: NDArray[np.int32]) -> Colours:
+    def colour_rows(self, rows: NDArray[np.int32]) -> Colours:
+        """Return the colours (n, 3) of rows of the cloud as they are drawn."""
         state = self._state
         assert state.cloud is not None
         return colour_points(state.cloud, state.result, state.view, dark=self.dark, rows=rows)
@@ -196,7 +197,7 @@ class Layers(QObject):
     def _show_close_up(self, rows: NDArray[np.int32]) -> None:
         if self._state.cloud is not None and not self._canvas.is_moving:
             self.close_up.seconds_per_point = self.whole.seconds_per_point
-            self.close_up.set_points(self._state.cloud, rows, self._colour)
+            self.close_up.set_points(self._state.cloud, rows, self.colour_rows)
             self._canvas.draw()
 
     def _end_close_up(self) -> None:

@@ -72,7 +72,7 @@ SPOT = 9.0
 """Radius of the ring around another view's cursor, pixels."""
 
 
-class Overlay(QWidget):
+class SceneOverlay(QWidget):
     """Lies over the canvas and is transparent to the mouse."""
 
     def __init__(self, parent: QWidget) -> None:
@@ -89,7 +89,7 @@ class Overlay(QWidget):
         """The profile that a plot's cursor is at, closed, local coordinates, shape (n, 3)."""
         self.hint = ""
         """What to do next, at the top."""
-        self._crosses: list[tuple[QRectF, int]] = []
+        self.crosses: list[tuple[QRectF, int]] = []
         self._projection: Projection | None = None
         self._pose: Pose | None = None
         self._targets: list[tuple[QRectF, int]] = []
@@ -107,7 +107,7 @@ class Overlay(QWidget):
 
     def measurement_at(self, position: QPointF) -> int:
         """Number of the measurement whose closing cross is there, or -1."""
-        return next((i for box, i in self._crosses if box.contains(position)), -1)
+        return next((i for box, i in self.crosses if box.contains(position)), -1)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
         """Write everything."""
@@ -129,7 +129,7 @@ class Overlay(QWidget):
         accent, text, paper = self._tint("accent"), self._tint("text"), self._paper()
         pens = Pens(accent, text, paper)
         spots = self._spots(self._projection)
-        self._crosses = draw_marks(painter, self.marks, self._projection, pens, taken, spots)
+        self.crosses = draw_marks(painter, self.marks, self._projection, pens, taken, spots)
         self._draw_labels(painter, self._projection, taken)
         painter.end()
 

@@ -78,7 +78,7 @@ class PointLayer:
         self._visible: Rows | None = None
         self._spread = Spread(0)
         self._colour: ColourRows | None = None
-        self._slices: list[_Slice] = []
+        self.slices: list[_Slice] = []
         self.seconds_per_point = 1e-7
         self._clip: Box | None = None
         self._is_drawing_new = False
@@ -96,16 +96,16 @@ class PointLayer:
     @property
     def parts(self) -> list[NDArray[np.float32]]:
         """The points that have been drawn, in parts."""
-        return [s.xyz for s in self._slices]
+        return [s.xyz for s in self.slices]
 
     @property
     def quick_parts(self) -> list[NDArray[np.float32]]:
         """The points that are drawn while moving: enough for hovering."""
-        return [s.xyz for s in self._slices if s.stop <= MOVING_LEVEL] or self.parts[:1]
+        return [s.xyz for s in self.slices if s.stop <= MOVING_LEVEL] or self.parts[:1]
 
     def cloud_index(self, row: int) -> int:
         """Index in the cloud of a row of `parts`, counted through."""
-        for part in self._slices:
+        for part in self.slices:
             if row < part.stop:
                 return int(part.rows[row - part.stop + len(part.rows)])
         raise IndexError(row)
@@ -126,7 +126,7 @@ class PointLayer:
     def set_colours(self, colour: ColourRows) -> None:
         """Recolour the points, each slice when it is drawn next."""
         self._colour = colour
-        for part in self._slices:
+        for part in self.slices:
             part.is_coloured = False
 
     def show(
@@ -153,7 +153,7 @@ class PointLayer:
             spacing = self.spacing * np.sqrt(min(len(self) / self.n_shown, 4))
             suiting = np.clip(1.2 * spacing / pixel_size, 1.5, MAX_POINT_PX)
             self.point_px = float(max(size * suiting, MIN_POINT_PX))
-        for i, part in enumerate(self._slices):
+        for i, part in enumerate(self.slices):
             part.actor.SetVisibility(i < len(shown))
             part.actor.GetProperty().SetPointSize(scale * self.point_px)
         for part in shown:
@@ -170,14 +170,14 @@ class PointLayer:
     def clip(self, box: Box) -> None:
         """Draw only what lies in the box; see `set_points` for leaving points out."""
         self._clip = box
-        for part in self._slices:
+        for part in self.slices:
             set_planes(part.actor, self._clip)
 
     def clear_actors(self) -> None:
         """Take all points out of the renderer."""
-        for part in self._slices:
+        for part in self.slices:
             self._renderer.RemoveActor(part.actor)
-        self._slices, self.n_shown = [], 0
+        self.slices, self.n_shown = [], 0
         self._visible = self._colour = self._clip = None
         self._spread = Spread(0)
 
@@ -188,13 +188,13 @@ class PointLayer:
 
     def _reach(self, limit: float) -> list[_Slice]:
         """Return the slices up to `limit` points, at least the first; make those not there yet."""
-        stop = self._slices[-1].stop if self._slices else 0
+        stop = self.slices[-1].stop if self.slices else 0
         while stop < len(self):
             start, stop = stop, min(max(2 * stop, SMALLEST_SLICE), stop + LARGEST_SLICE, len(self))
             if start and stop > limit:
                 break
-            self._slices.append(self._make_slice(start, stop))
-        return [s for i, s in enumerate(self._slices) if i == 0 or s.stop <= limit]
+            self.slices.append(self._make_slice(start, stop))
+        return [s for i, s in enumerate(self.slices) if i == 0 or s.stop <= limit]
 
     def _recolour(self, part: _Slice) -> None:
         if part.is_coloured:

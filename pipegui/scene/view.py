@@ -18,11 +18,11 @@ from pipegui.scene.aiming import aim
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.clipping import BoxFrame
 from pipegui.scene.decorations import Decorations
-from pipegui.scene.glimpse import Glimpse
 from pipegui.scene.layers import Layers
 from pipegui.scene.legend import make_legend
 from pipegui.scene.measure_marks import MeasureMark, lines_of
-from pipegui.scene.overlay import Overlay, label_of
+from pipegui.scene.overlay import SceneOverlay, label_of
+from pipegui.scene.partial_cloud import PartialCloud
 from pipegui.scene.picking import warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
@@ -74,11 +74,11 @@ class SceneView(QWidget):
         self._is_picking = False
         self._hovered = -1
         self.canvas = Canvas(self)
-        self.overlay = Overlay(self.canvas)
+        self.overlay = SceneOverlay(self.canvas)
         self.layers = Layers(self.canvas, self)
         self._decorations = Decorations(self.canvas.layers)
         self._frame = BoxFrame(self.canvas.layers[1])
-        self._glimpse = Glimpse(self.canvas.layers[0])
+        self.partial_cloud = PartialCloud(self.canvas.layers[0])
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.canvas)
@@ -169,16 +169,16 @@ class SceneView(QWidget):
         """Whether steps in depth are shaded where nobody has chosen."""
         return self.canvas.is_drawn and not self.canvas.is_software
 
-    def glimpse(self, part: PointCloud) -> None:
+    def show_partial_cloud(self, part: PointCloud) -> None:
         """Show a part of a scan that is still being read, and all before it."""
         if self._background is None:
             self._set_background(_background(self._state.view))
-        self._glimpse.add(part, self.devicePixelRatioF())
-        self.canvas.fly_to(self._framed(self.canvas.pose, self._glimpse.sample), fly=False)
+        self.partial_cloud.add(part, self.devicePixelRatioF())
+        self.canvas.fly_to(self._framed(self.canvas.pose, self.partial_cloud.sample), fly=False)
 
-    def end_glimpse(self) -> None:
+    def hide_partial_cloud(self) -> None:
         """Take the parts away."""
-        self._glimpse.clear()
+        self.partial_cloud.clear()
         self.canvas.draw()
 
     # Camera
@@ -357,7 +357,7 @@ class SceneView(QWidget):
         self._decorations.clear()
         self._frame.show(None, (0.0, 0.0, 0.0))
         self.layers.forget()
-        self._glimpse.clear()
+        self.partial_cloud.clear()
         self._state = SceneState()
         self.canvas.close()
         super().closeEvent(event)

@@ -144,11 +144,11 @@ class MainWindow(QMainWindow):
         """Show what was read so far of the first scan."""
         if not self._has_scan:
             self.centre.setCurrentWidget(self.views.scene)
-            self.views.scene.glimpse(part)
+            self.views.scene.show_partial_cloud(part)
 
     def end_partial_cloud(self) -> None:
         """Show no more of what was read so far: it comes as a scan, or not at all."""
-        self.views.scene.end_glimpse()
+        self.views.scene.hide_partial_cloud()
         if not self._has_scan:
             self.centre.setCurrentWidget(self.panels.welcome)
 

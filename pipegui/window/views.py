@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from pipegui.plots.deviation_map import DeviationMapView
+from pipegui.plots.deviation_map_view import DeviationMapView
 from pipegui.plots.preview_view import PreviewView
 from pipegui.plots.radius_plot import RadiusPlot
 from pipegui.plots.section_view import SectionView

@@ -38,13 +38,13 @@ class FakeScene(FakeView):
     def __init__(self) -> None:
         super().__init__()
         self.standard_views: list[str] = []
-        self.glimpses: list[Any] = []
+        self.partial_clouds: list[Any] = []
 
-    def glimpse(self, part: Any) -> None:
-        self.glimpses.append(part)
+    def show_partial_cloud(self, part: Any) -> None:
+        self.partial_clouds.append(part)
 
-    def end_glimpse(self) -> None:
-        self.glimpses.append(None)
+    def hide_partial_cloud(self) -> None:
+        self.partial_clouds.append(None)
 
     shades_edges = False
 

@@ -55,7 +55,7 @@ def named(widget):
 @pytest.fixture
 def whole(make_app, qtbot):
     """A window with the real plots beside a fake 3D view."""
-    from pipegui.plots.deviation_map import DeviationMapView
+    from pipegui.plots.deviation_map_view import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView

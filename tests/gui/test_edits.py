@@ -119,7 +119,7 @@ def test_that_f2_names_a_pipe_in_the_tree_and_the_name_shows_everywhere(app, qtb
 def test_that_f2_names_a_run_and_the_name_shows_everywhere(app, qtbot):
     view, model = app.window.panels.tree.view, app.window.panels.tree.model
     row = model.index_of(0, Selection(run_id=1))
-    n_elements = len(app.window.panels.tree.model._node(row).elements)
+    n_elements = len(app.window.panels.tree.model.node(row).elements)
     view.scrollTo(row)
     qtbot.mouseClick(view.viewport(), LEFT, pos=view.visualRect(row).center())
     qtbot.keyClick(view, Qt.Key.Key_F2)

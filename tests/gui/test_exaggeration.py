@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from pipecore.inspection.section import PlaneEllipse
+from pipecore.inspection.section import SectionEllipse
 from pipegui.plots.exaggeration import ellipse_points, exaggerate
 
-CIRCLE = PlaneEllipse((0.003, -0.002), 0.080, 0.080, 0.0)
-TILTED = PlaneEllipse((0.003, -0.002), 0.110, 0.080, 0.7)
+CIRCLE = SectionEllipse((0.003, -0.002), 0.080, 0.080, 0.0)
+TILTED = SectionEllipse((0.003, -0.002), 0.110, 0.080, 0.7)
 
 
 @pytest.mark.parametrize("reference", [CIRCLE, TILTED])

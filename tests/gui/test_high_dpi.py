@@ -30,7 +30,7 @@ def main() -> None:
     scene.show()
     assert QTest.qWaitForWindowExposed(scene, PATIENCE)
     scene.apply(scene_state(view=STILL))
-    while scene.canvas.is_moving or scene.canvas._is_stale or not scene.points.n_shown:
+    while scene.canvas.is_moving or scene.canvas.is_stale or not scene.points.n_shown:
         app.processEvents()
     meant = [index for element in ELEMENTS for index in seen_points(scene, element, 3)]
     picked = []

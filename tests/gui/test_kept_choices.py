@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QTabWidget
 
 from pipegui.controllers.remembered_choices import remember_choices, remember_tab
 from pipegui.panels.deformation_table import DeformationTable
-from pipegui.plots.deviation_map import DeviationMapView
+from pipegui.plots.deviation_map_view import DeviationMapView
 from pipegui.plots.preview_view import PreviewView
 from pipegui.plots.radius_plot import AT_FIRST, RadiusPlot
 from pipegui.plots.section_view import SectionView

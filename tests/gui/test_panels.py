@@ -340,8 +340,8 @@ def test_that_the_form_refuses_what_the_settings_would_refuse(qtbot):
 def test_that_a_changed_setting_stands_out_and_can_be_reset(qtbot):
     form = show(qtbot, SettingsForm())
     form.apply(Settings().replace({"elements.min_radius_mm": 40.0}))
-    assert form._labels["elements.min_radius_mm"].font().bold()
-    assert not form._labels["elements.max_radius_mm"].font().bold()
+    assert form.labels["elements.min_radius_mm"].font().bold()
+    assert not form.labels["elements.max_radius_mm"].font().bold()
     with qtbot.waitSignal(form.reset_requested):
         qtbot.mouseClick(form.reset, LEFT)
 

@@ -11,7 +11,7 @@ from PySide6.QtGui import QGuiApplication, QImage
 
 from pipegui.model.document import ProfileKey, Selection
 from pipegui.plots.chart import SAVED_AS
-from pipegui.plots.deviation_map import DeviationMapView
+from pipegui.plots.deviation_map_view import DeviationMapView
 from pipegui.plots.export import to_csv, to_tsv
 from pipegui.plots.radius_plot import RadiusPlot
 from pipegui.plots.section_view import SectionView

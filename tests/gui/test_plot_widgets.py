@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QApplication
 
 from pipegui.model import commands, result_queries
 from pipegui.model.document import Document, ProfileKey, Scan, Selection
-from pipegui.plots.deviation_map import DeviationMapView
+from pipegui.plots.deviation_map_view import DeviationMapView
 from pipegui.plots.radius_plot import RadiusPlot
 from pipegui.plots.section_view import SectionView
 from pipegui.states.view_state import MapState, RadiusPlotState, SectionState, resolve

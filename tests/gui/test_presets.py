@@ -50,7 +50,7 @@ def test_that_every_preset_of_the_program_loads_and_says_what_it_is_for(presets)
 
 def test_that_saved_settings_come_back_without_what_belongs_to_the_scan(presets):
     presets.save("Boiler house 3", OWN)
-    back = Presets(presets._folder).every()[-1]
+    back = Presets(presets.folder).every()[-1]
     assert (back.name, back.is_own) == ("Boiler house 3", True)
     assert back.load().elements.min_radius_mm == 42.0
     assert back.load().input == Settings().input
@@ -75,12 +75,12 @@ def test_that_names_that_will_not_do_are_refused(presets, name):
     assert presets.objection(name)
     with pytest.raises(SettingsError):
         presets.save(name, OWN)
-    assert not presets._folder.exists()
+    assert not presets.folder.exists()
 
 
 def test_that_a_broken_file_harms_nothing_until_it_is_chosen(presets):
     presets.save("good", OWN)
-    (presets._folder / "broken.toml").write_text("elements = 3")
+    (presets.folder / "broken.toml").write_text("elements = 3")
     assert "broken" in names(presets)
     assert presets.matching(OWN).name == "good"
     with pytest.raises(SettingsError):
@@ -115,12 +115,12 @@ def test_that_settings_are_saved_by_name_chosen_and_deleted_in_the_form(form, qt
 
 
 def test_that_a_preset_that_cannot_be_read_is_told(form, qtbot, presets):
-    presets._folder.mkdir()
-    (presets._folder / "broken.toml").write_text("elements = 3")
+    presets.folder.mkdir()
+    (presets.folder / "broken.toml").write_text("elements = 3")
     form.presets.use(presets)
     row = form.presets.choice.findText("broken")
     with qtbot.waitSignal(form.presets.failed) as told:
-        form.presets._choose(row)
+        form.presets.choose(row)
     assert "broken" in told.args[0]
     assert form.presets.choice.currentText() == STANDARD
 
@@ -130,15 +130,15 @@ def test_that_one_setting_and_one_group_go_back_to_their_defaults(form, qtbot):
         {"elements.min_radius_mm": 40.0, "elements.min_length_mm": 55.0, "stacks.width_mm": 9.0}
     )
     form.apply(settings)
-    assert form._resets["elements.min_radius_mm"].isVisible()
-    assert not form._resets["elements.max_radius_mm"].isVisible()
+    assert form.resets["elements.min_radius_mm"].isVisible()
+    assert not form.resets["elements.max_radius_mm"].isVisible()
     with qtbot.waitSignal(form.keys_reset) as told:
-        qtbot.mouseClick(form._resets["elements.min_radius_mm"], LEFT)
+        qtbot.mouseClick(form.resets["elements.min_radius_mm"], LEFT)
     assert told.args == [["elements.min_radius_mm"]]
     document = commands.reset_keys(Document(settings=settings), told.args[0])
     assert document.settings.elements.min_radius_mm == Settings().elements.min_radius_mm
     assert document.settings.elements.min_length_mm == 55.0
-    _, button = next(g for g in form._group_resets if "elements.min_radius_mm" in g[0])
+    _, button = next(g for g in form.group_resets if "elements.min_radius_mm" in g[0])
     with qtbot.waitSignal(form.keys_reset) as told:
         qtbot.mouseClick(button, LEFT)
     document = commands.reset_keys(Document(settings=settings), told.args[0])
@@ -162,7 +162,7 @@ def test_that_a_preset_in_the_window_is_one_step_that_can_be_undone(app, qtbot):
     bar = app.window.panels.settings.presets
     row = bar.choice.findText("Large pipes")
     bar.choice.setCurrentIndex(row)
-    bar._choose(row)
+    bar.choose(row)
     assert app.session.document.settings.elements.min_radius_mm == 100.0
     app.window.actions_["undo"].trigger()
     assert app.session.document.settings == Settings()

@@ -195,7 +195,7 @@ def test_that_planned_stacks_are_listed_before_a_detection(qtbot, plan):
     item = panel.list.topLevelItem(0)
     assert [item.text(c) for c in (NAME, PROFILES)] == ["X", f"{plan.stacks[0].n_profiles:,}"]
     assert item.text(SHARE) == f"{100 * plan.stacks[0].share:.0f} %"
-    assert "of the surface" in panel._note.text()
+    assert "of the surface" in panel.note.text()
 
 
 def test_that_cut_stacks_keep_the_share_of_their_plan(qtbot, document, plan):

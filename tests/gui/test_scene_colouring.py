@@ -8,6 +8,7 @@ from pipecore.formatting import MINUS
 from pipegui.model import commands, view_commands
 from pipegui.model.colour_limits import shown_limits
 from pipegui.model.document import Box, ColourBy, Document, Scan, ViewOptions
+from pipegui.scene.colour_assignment import colour_apart, neighbouring_ids
 from pipegui.scene.colouring import (
     MUTED,
     SOUND,
@@ -18,7 +19,6 @@ from pipegui.scene.colouring import (
     visible_points,
 )
 from pipegui.scene.legend import make_legend
-from pipegui.scene.neighbours import colour_apart, neighbouring_ids
 from pipegui.scene.spreading import Spread
 from pipegui.style.colour_maps import (
     DEVIATION,

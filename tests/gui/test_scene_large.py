@@ -37,7 +37,7 @@ def show(view, **options):
 
 
 def rows_of(layer: PointLayer):
-    return np.sort(np.concatenate([part.rows for part in layer._slices]))
+    return np.sort(np.concatenate([part.rows for part in layer.slices]))
 
 
 @pytest.mark.parametrize("box", [BOX, replace(BOX, is_inverted=True)])
@@ -72,19 +72,19 @@ def test_that_only_the_last_of_many_boxes_counts(large, qtbot):
 
 def test_that_points_take_their_new_colour_when_they_are_drawn(large, qtbot, monkeypatch):
     n_coloured = []
-    colour = large.layers._colour
+    colour = large.layers.colour_rows
 
     def count(rows):
         n_coloured.append(len(rows))
         return colour(rows)
 
-    monkeypatch.setattr(large.layers, "_colour", count)
+    monkeypatch.setattr(large.layers, "colour_rows", count)
     show(large, colour_by=ColourBy.HEIGHT)
     assert n_coloured == []  # nothing has been drawn yet
     assert large.canvas.is_moving
     settle(qtbot, large)
     assert sum(n_coloured) == large.points.n_shown
-    for part in large.points._slices:
+    for part in large.points.slices:
         assert part.is_coloured
         assert np.array_equal(part.colours, colour(part.rows))
 
@@ -93,7 +93,7 @@ def test_that_moving_a_face_of_the_box_uploads_no_point_again(large, qtbot):
     large.layers.begin_preview(BOX)
     with qtbot.waitSignal(large.canvas.drawn):
         large.canvas.move_to(large.canvas.pose)
-    mapper = large.layers.preview._slices[0].actor.GetMapper()
+    mapper = large.layers.preview.slices[0].actor.GetMapper()
     before = mapper.GetMTime()
     large.layers.preview.clip(replace(BOX, high=(1.4, 1.8, 1.2)))
     assert mapper.GetMTime() == before

@@ -104,7 +104,7 @@ def test_that_the_cross_of_a_measurement_deletes_it_and_no_other(desk):
     desk.do(lambda d: view_commands.set_view(d, measurements=two))
     settle(desk.qtbot, desk.scene)
     desk.scene.screenshot()
-    box, number = desk.scene.overlay._crosses[1]
+    box, number = desk.scene.overlay.crosses[1]
     assert number == 1
     desk.click(box.center().toPoint())
     assert desk.view.measurements == two[:1]
@@ -215,7 +215,7 @@ def test_that_an_inverted_box_shows_what_is_outside_of_it(desk):
     inside = np.all((CLOUD.xyz >= BOX.low) & (CLOUD.xyz <= BOX.high), axis=1)
     desk.do(view_commands.invert_clip)
     settle(desk.qtbot, desk.scene)
-    rows = np.concatenate([s.rows for s in desk.scene.points._slices])
+    rows = np.concatenate([s.rows for s in desk.scene.points.slices])
     assert np.array_equal(np.sort(rows), np.flatnonzero(~inside))
     desk.do(view_commands.invert_clip)
     assert desk.view.clip_box == BOX

@@ -53,7 +53,7 @@ def settle(qtbot, view):
     """Wait until the camera rests and the picture is drawn in full."""
     canvas = view.canvas
     qtbot.waitUntil(
-        lambda: not canvas.is_moving and not canvas._is_stale and view.points.n_shown > 0
+        lambda: not canvas.is_moving and not canvas.is_stale and view.points.n_shown > 0
     )
 
 
@@ -186,11 +186,11 @@ def test_that_fewer_points_are_drawn_while_moving_and_all_at_rest(qtbot, no_leak
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
     view.points.seconds_per_point = 1e-5  # as on a slow machine
-    view.canvas._resting.setInterval(PATIENCE)
+    view.canvas.rest_timer.setInterval(PATIENCE)
     with qtbot.waitSignal(view.canvas.drawn):
         view.set_standard_view("top")
     assert view.points.n_shown < 60_000
-    view.canvas._resting.start(0)
+    view.canvas.rest_timer.start(0)
     settle(qtbot, view)
     assert view.points.n_shown == 60_000
     view.close()
@@ -253,8 +253,8 @@ def test_that_an_idle_repaint_does_not_draw_the_points_again(scene, qtbot):
     qtbot.waitUntil(
         lambda: (
             canvas.seconds_to_draw == SETTLED_SECONDS
-            and not canvas._settling.isActive()
-            and not canvas._is_stale
+            and not canvas.settle_timer.isActive()
+            and not canvas.is_stale
         )
     )
     with qtbot.assertNotEmitted(scene.canvas.drawn):
@@ -382,17 +382,17 @@ def test_that_parts_of_a_scan_are_seen_while_it_is_read(qtbot, no_leaks):
     half = len(CLOUD) // 2
     for start in (0, half):
         at = slice(start, start + half)
-        view.glimpse(PointCloud(CLOUD.origin, CLOUD.xyz[at], rgb=CLOUD.rgb[at]))
+        view.show_partial_cloud(PointCloud(CLOUD.origin, CLOUD.xyz[at], rgb=CLOUD.rgb[at]))
         with qtbot.waitSignal(view.canvas.drawn):
             view.canvas.draw()
     seen = np.abs(picture(view) - background).max(axis=2) > 25
     assert seen.mean() > 0.03
     pixels, _ = view.canvas.projection().to_screen(CLOUD.xyz.astype(float))
     assert ((pixels > 0) & (pixels < [320, 240])).all(axis=1).mean() > 0.99
-    view.end_glimpse()
+    view.hide_partial_cloud()
     view.apply(scene_state())
     settle(qtbot, view)
-    assert len(view._glimpse) == 0
+    assert len(view.partial_cloud) == 0
     assert view.points.n_shown > 0
     view.close()
 

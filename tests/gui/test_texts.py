@@ -171,7 +171,7 @@ def test_that_the_empty_window_is_german_too(make_app):
 
 @pytest.mark.usefixtures("german")
 def test_that_nothing_english_is_left_in_the_german_window(make_app):
-    from pipegui.plots.deviation_map import DeviationMapView
+    from pipegui.plots.deviation_map_view import DeviationMapView
     from pipegui.plots.preview_view import PreviewView
     from pipegui.plots.radius_plot import RadiusPlot
     from pipegui.plots.section_view import SectionView

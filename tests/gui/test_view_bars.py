@@ -137,11 +137,11 @@ def test_that_a_scan_is_seen_while_it_is_read(make_app, qtbot):
 
     app = make_app(read=read)
     app.controllers.scans.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: app.window.views.scene.glimpses == [part])
+    qtbot.waitUntil(lambda: app.window.views.scene.partial_clouds == [part])
     assert app.window.centre.currentWidget() is app.window.views.scene
     go_on.set()
     qtbot.waitUntil(lambda: app.session.document.scan is not None)
-    assert app.window.views.scene.glimpses == [part, None]
+    assert app.window.views.scene.partial_clouds == [part, None]
 
 
 def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_app, qtbot):
@@ -155,7 +155,7 @@ def test_that_the_welcome_comes_back_where_reading_was_cancelled(make_app, qtbot
 
     app = make_app(read=read)
     app.controllers.scans.open_files([Path("plant.laz")])
-    qtbot.waitUntil(lambda: len(app.window.views.scene.glimpses) == 1)
+    qtbot.waitUntil(lambda: len(app.window.views.scene.partial_clouds) == 1)
     app.session.jobs.cancel()
     qtbot.waitUntil(lambda: app.window.centre.currentWidget() is app.window.panels.welcome)
-    assert app.window.views.scene.glimpses[-1] is None
+    assert app.window.views.scene.partial_clouds[-1] is None

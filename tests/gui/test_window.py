@@ -132,7 +132,7 @@ def test_that_a_choice_anywhere_is_shown_everywhere(detected, qtbot, by):
         tree = app.window.panels.tree
         index = next(
             tree.model.createIndex(n.row, 0, n.number)
-            for n in tree.model._nodes
+            for n in tree.model.nodes
             if n.text == "Dent 4 · Pipe 9"
         )
         tree.view.scrollTo(index)

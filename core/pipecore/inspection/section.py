@@ -23,7 +23,7 @@ lies this near to the element's axis, in radii."""
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneEllipse:
+class SectionEllipse:
     """An ellipse in a profile's plane.
 
     Parameters
@@ -87,11 +87,11 @@ class Section:
         The profile, a table of one row.
     points_uv : ndarray, shape (n, 2)
         Its points relative to the centre of its ellipse, metres.
-    fitted : PlaneEllipse
+    fitted : SectionEllipse
         Its own ellipse.
-    reference : PlaneEllipse
+    reference : SectionEllipse
         The element's undeformed contour in this plane.
-    nominal : PlaneEllipse, optional
+    nominal : SectionEllipse, optional
         The contour of the nominal size, about the same axis.
     curve : SectionCurve, optional
         The smooth curve through the points, about the centre of `reference`.
@@ -101,9 +101,9 @@ class Section:
 
     profile: Profiles
     points_uv: Array
-    fitted: PlaneEllipse
-    reference: PlaneEllipse
-    nominal: PlaneEllipse | None = None
+    fitted: SectionEllipse
+    reference: SectionEllipse
+    nominal: SectionEllipse | None = None
     curve: "SectionCurve | None" = None
     no_curve: Reason = Reason()
 
@@ -181,11 +181,11 @@ def cut_section(element: Element, profile: Profiles, xyz: Array) -> Section:
     axis_u, axis_v = in_plane(element.axis.at(chainage)).tolist()
     tilted_towards = float(np.arctan2(tangent @ up, tangent @ right))
 
-    def contour(radius: float) -> PlaneEllipse:
-        return PlaneEllipse((axis_u, axis_v), radius / cos_tilt, radius, tilted_towards)
+    def contour(radius: float) -> SectionEllipse:
+        return SectionEllipse((axis_u, axis_v), radius / cos_tilt, radius, tilted_towards)
 
     major = profile.major_direction[0]
-    fitted = PlaneEllipse(
+    fitted = SectionEllipse(
         (0.0, 0.0),
         float(profile.semi_major[0]),
         float(profile.semi_minor[0]),

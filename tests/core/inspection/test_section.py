@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore.geometry import surface_points
-from pipecore.inspection.section import PlaneEllipse, cut_section, radius_is_measurable
+from pipecore.inspection.section import SectionEllipse, cut_section, radius_is_measurable
 from tests.core.inspection.sections import (
     CHAINAGE,
     ONE_SIDE,
@@ -16,8 +16,8 @@ from tests.core.inspection.sections import (
     dented,
 )
 
-CIRCLE = PlaneEllipse((0.003, -0.002), 0.080, 0.080, 0.0)
-TILTED = PlaneEllipse((0.003, -0.002), 0.110, 0.080, 0.7)
+CIRCLE = SectionEllipse((0.003, -0.002), 0.080, 0.080, 0.0)
+TILTED = SectionEllipse((0.003, -0.002), 0.110, 0.080, 0.7)
 
 
 def test_that_deviation_from_a_circle_is_the_distance_beyond_its_radius():

@@ -15,7 +15,7 @@ MOST = 3_000_000
 N_SAMPLED = 400
 
 
-class Glimpse:
+class PartialCloud:
     """Parts of a cloud as they come, each an actor."""
 
     def __init__(self, renderer: vtkRenderer) -> None:

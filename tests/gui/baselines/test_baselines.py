@@ -18,12 +18,14 @@ from pipegui.window.views import make_views
 from tests.factories import make_cloud, make_result
 from tests.gui.patience import wait_until_still
 
-BASELINES = Path(__file__).parents[1] / "data" / "baselines"
+BASELINES = Path(__file__).parents[2] / "data" / "baselines"
 SMALL = 64, 40
 MAX_DIFFERENCE, MAX_SHARE = 24, 0.02
 """Grey levels by which small pixels may differ, and the share that may differ by more."""
 VIEWS = ("scene", "radius_plot", "section", "map")
 MANY = 60_000
+
+pytestmark = pytest.mark.baseline
 
 
 @pytest.fixture
