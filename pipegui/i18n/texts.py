@@ -82,25 +82,25 @@ def first_capital(text: str) -> str:
 
 
 def label_of(element: Element) -> str:
-    """What an element is called: its own name, else such as "Pipe 3"."""
+    """Return the name of an element: its own, else such as "Pipe 3"."""
     kind = element.label.removesuffix(f" {element.element_id}")
     return element.name or f"{tr(kind)} {element.element_id}"
 
 
 def run_label(result: Result, run_id: int) -> str:
-    """What a run is called: its own name, else such as "Run 3"."""
+    """Return the name of a run: its own, else such as "Run 3"."""
     return result.run_names.get(run_id) or tr("Run {run_id}").format(run_id=run_id)
 
 
 def error_text(error: Exception) -> str:
-    """What an error says; those of the core come with what stands in their sentence."""
+    """Return the message of an error in the language in use."""
     if not isinstance(error, PipecoreError):
         return str(error)
-    spoken = {name: _spoken(name, value) for name, value in error.values.items()}
-    return tr(error.template).format(**spoken) if spoken else tr(error.template)
+    values = {name: _display_value(name, value) for name, value in error.values.items()}
+    return tr(error.template).format(**values) if values else tr(error.template)
 
 
-def _spoken(name: str, value: object) -> object:
+def _display_value(name: str, value: object) -> object:
     match value:
         case PipecoreError():
             return error_text(value)

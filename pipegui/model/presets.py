@@ -60,7 +60,9 @@ class Presets:
     def every(self) -> list[Preset]:
         """Return the standard, those of the program, then the user's own by name."""
         shipped = sorted(resource("presets").glob("*.toml"))
-        built_in = [Preset(_spoken(path), path, False, _first_comment(path)) for path in shipped]
+        built_in = [
+            Preset(_display_name(path), path, False, _first_comment(path)) for path in shipped
+        ]
         names = {preset.name for preset in built_in} | {STANDARD}
         paths = sorted(self.folder.glob("*.toml"), key=lambda path: path.stem.casefold())
         own = [Preset(path.stem, path, True) for path in paths if path.stem not in names]
@@ -118,7 +120,7 @@ class Presets:
             preset.path.unlink(missing_ok=True)
 
 
-def _spoken(path: Path) -> str:
+def _display_name(path: Path) -> str:
     """The name of a preset that comes with the program, from its file's name."""
     return path.stem.replace("-", " ").capitalize()
 

@@ -116,7 +116,7 @@ class ClipBar(QWidget):
             button.setIcon(theme.icon(icon))
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802
-        """With icons: words must not make the window wider."""
+        """Return the size with icons: words must not make the window wider."""
         return QSize(self._needed(words=False), super().minimumSizeHint().height())
 
     def _needed(self, *, words: bool) -> int:

@@ -55,7 +55,7 @@ class TableColumn:
         return self.key
 
     def why_not(self, row: Row) -> str:
-        """Why a cell holds no number."""
+        """Return why a cell holds no number."""
         default = tr("The scan does not carry this number: its arc is too short, or too noisy.")
         return reason_text(row.deformation.not_measurable.get(self.field, default))
 
@@ -70,7 +70,7 @@ def _number(
     field: str = "",
     is_shown_first: bool = True,
 ) -> TableColumn:
-    """A column of numbers; empty where the deformation's kind has no such number."""
+    """Return a column of numbers, empty where the deformation's kind has no such number."""
 
     def text(row: Row) -> str:
         number = value(row)

@@ -91,7 +91,7 @@ class FilterBar(QWidget):
     # Kept from one session to the next
 
     def choices(self) -> dict[str, Any]:
-        """What is chosen, as plain values."""
+        """Return the filters chosen, as plain values."""
         chosen = {name: combo.currentData() for name, combo in self._combos().items()}
         plain = {name: str(value) if value else "" for name, value in chosen.items()}
         return plain | {"min_depth_mm": self.min_depth.value()}

@@ -33,7 +33,7 @@ REVIEW_ICON = {
 
 
 class DeformationModel(QAbstractTableModel):
-    """The deformations of a result, the worst first; what a person edits is told as a signal."""
+    """The deformations of a result, the worst first; edits are signalled."""
 
     reviewed = Signal(int, object)
     """Id of the deformation and its `ReviewState`."""
@@ -158,7 +158,7 @@ class DeformationModel(QAbstractTableModel):
         return tr(COLUMNS[column].hint) or (text if column == COMMENT_COLUMN else None)
 
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
-        """Tell what a person decided or wrote; the cell shows it once the document holds it."""
+        """Signal what a person decided or wrote; the cell shows it once the document holds it."""
         if role != Role.EditRole or not self.flags(index) & Qt.ItemFlag.ItemIsEditable:
             return False
         row = self._rows[index.row()]
@@ -199,7 +199,7 @@ class DeformationFilter(QSortFilterProxyModel):
         self.invalidate()
 
     def filterAcceptsRow(self, source_row: int, source_parent: Index) -> bool:  # noqa: N802
-        """Whether a deformation is shown."""
+        """Return whether a deformation is shown."""
         deformation = self._model.deformation(source_row)
         return (
             self.kind in (None, deformation.kind)

@@ -44,7 +44,7 @@ DECISIONS = {
 
 
 class DeformationTable(QWidget):
-    """Shows the deformations; choosing, reviewing and commenting are told as signals."""
+    """Shows the deformations; signals what is chosen, reviewed and commented."""
 
     chosen = Signal(int)
     """Id of the deformation that the user selected."""

@@ -319,5 +319,5 @@ class ProjectModel(QAbstractItemModel):
 
 
 def _shown_of(scans: tuple[Scan, ...]) -> list[tuple[Any, ...]]:
-    """What of the scans has nodes; reviews, for one, have not."""
+    """Return the parts of the scans that have nodes; reviews, for one, have none."""
     return [(scan.name, scan.cloud, scan.result) for scan in scans]

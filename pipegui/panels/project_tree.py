@@ -30,7 +30,7 @@ __all__ = ["NodeKind", "ProjectTree"]
 
 
 class ProjectTree(QWidget):
-    """Shows the project; selecting and check boxes are told as signals."""
+    """Shows the project; signals what is selected, shown and hidden."""
 
     chosen = Signal(int, object, int)
     """Scan, `NodeKind` and id of what the user selected."""
@@ -121,7 +121,7 @@ class ProjectTree(QWidget):
         return is_any_shown
 
     def _closed(self) -> set[tuple[int, NodeKind, int]]:
-        """What the user has closed of the branches."""
+        """Return the branches that the user has closed."""
         view, branches = self.view, self.model.branches()
         return {self.model.what(index) for index in branches if not view.isExpanded(index)}
 
@@ -145,7 +145,7 @@ class ProjectTree(QWidget):
         self.view.scrollTo(index)
 
     def _tell(self) -> None:
-        """Tell what was selected; where there are several elements, the current one leads."""
+        """Signal what was selected; of several elements the current one comes first."""
         if self._applying:
             return
         rows = self.view.selectionModel().selectedRows(NAME)

@@ -22,7 +22,7 @@ class StackEditor(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.view_direction: Callable[[], Array] | None = None
-        """Tells where the 3D view looks; set by the window."""
+        """Returns the direction in which the 3D view looks; set by the window."""
         self.components = [self._component(name) for name in "XYZ"]
         self.width_mm = QuietSpinBox()
         self.width_mm.setAccessibleName(tr("Profile width"))

@@ -47,7 +47,7 @@ STACK_ID = int(Qt.ItemDataRole.UserRole) + 1
 PLAN_ROW = int(Qt.ItemDataRole.UserRole) + 2
 SAME_DIRECTION = np.cos(np.deg2rad(0.1))
 ALIKE_DIRECTION, ALIKE_WIDTH = np.cos(np.deg2rad(5.0)), 0.2
-"""A planned stack tells of a cut one within these: the sample's directions differ a little."""
+"""A planned stack stands for a cut one within these: the sample's directions differ a little."""
 
 
 class StacksPanel(QWidget):
@@ -341,12 +341,12 @@ class StacksPanel(QWidget):
         QTimer.singleShot(0, self, self.points_taken.emit)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Tell that somebody looks."""
+        """Signal that the panel is seen."""
         super().showEvent(event)
         self.seen.emit(True)
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802
-        """Tell that nobody looks any more."""
+        """Signal that the panel is hidden."""
         super().hideEvent(event)
         self.seen.emit(False)
 
@@ -375,7 +375,7 @@ class StacksPanel(QWidget):
 
 
 def _is_of(stack: Stack, direction: tuple[float, ...]) -> bool:
-    """Whether a cut stack is that of an own direction, which counts either way round."""
+    """Return whether a cut stack is that of an own direction, which counts either way round."""
     own = np.array(direction[:3]) / np.linalg.norm(direction[:3])
     is_parallel = abs(float(own @ stack.direction)) > SAME_DIRECTION
     return is_parallel and (len(direction) < 4 or abs(1000 * stack.width - direction[3]) < 0.01)

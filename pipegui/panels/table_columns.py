@@ -75,7 +75,7 @@ class TableColumns(QObject):
         self._follows_room = not known
         order = list(known or SHOWN_FIRST)
         for i, column in enumerate(COLUMNS):
-            if column.key not in order:  # hidden ones wait beside their neighbours
+            if column.key not in order:  # hidden ones stay next to their neighbours
                 order.insert(order.index(COLUMNS[i - 1].key) + 1 if i else 0, column.key)
         with self._applying:
             for place, key in enumerate(order):
@@ -132,7 +132,7 @@ class TableColumns(QObject):
             self._view.setColumnWidth(column, max(self._view.columnWidth(column), width))
 
     def _suiting(self) -> list[str]:
-        """The columns of the start, less the least important until no scrolling is needed."""
+        """Return the default columns, less the least important until no scrolling is needed."""
         widths = {key: self._view.columnWidth(INDEX[key]) for key in SHOWN_FIRST}
         # The last one takes what is left.
         widths["comment"] = ROOM["comment"]
@@ -151,7 +151,7 @@ class TableColumns(QObject):
     # Kept from one session to the next
 
     def choices(self) -> dict[str, Any]:
-        """The columns that the user chose; none where that is left to the room."""
+        """Return the columns that the user chose; none where that is left to the width."""
         return {"columns": [] if self._follows_room else self.shown}
 
     def choose(self, choices: Mapping[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What the plots share: a themed pyqtgraph canvas, a line to read from, and a word if empty."""
+"""Base of the plots: a themed pyqtgraph canvas, a readout line, and a hint while empty."""
 
 from collections.abc import Callable
 from functools import partial
@@ -116,21 +116,21 @@ class Chart(QWidget):
         return True
 
     def plots(self) -> list[pg.PlotItem]:
-        """The plots from top to bottom."""
+        """Return the plots from top to bottom."""
         return [item for item in self.canvas.ci.items if isinstance(item, pg.PlotItem)]
 
     def show_filled(self, filled: bool) -> None:
-        """Show the plots, or the word that says what would fill them."""
+        """Show the plots, or the hint that says what would fill them."""
         self._stack.setCurrentIndex(int(filled))
 
     # Copying and saving
 
     def numbers(self) -> Table:
-        """What is plotted, as plain numbers."""
+        """Return what is plotted as columns of plain numbers."""
         raise NotImplementedError
 
     def heading(self) -> str:
-        """What stands above the plot in a picture, as rich text."""
+        """Return the heading of a saved picture, as rich text."""
         return ""
 
     def fit(self) -> None:

@@ -117,7 +117,7 @@ class DeviationMapView(Chart):
         self._shapes.append(shape)
 
     def boxes(self, deformation: Deformation) -> list[QRectF]:
-        """Where a deformation lies on the map; twice if it goes over the cut at 6:00."""
+        """Return where a deformation lies on the map; twice if it crosses the cut at 6:00."""
         length = deformation.chainage_end - deformation.chainage_start
         width = float(np.rad2deg(self._angular_width(deformation)))
         if width >= np.rad2deg(WHOLE_ROUND):
@@ -147,7 +147,7 @@ class DeviationMapView(Chart):
     # Copying
 
     def heading(self) -> str:
-        """What is unrolled, and what the colours mean."""
+        """Return the element's name and what the colours mean."""
         element, limit = self.state.element, self.state.limit_mm
         name = "" if element is None else label_of(element)
         blue, red = (QColor(*DEVIATION[i].tolist()).name() for i in (0, -1))
@@ -158,7 +158,7 @@ class DeviationMapView(Chart):
         ).format(name=name, inward=inward, limit=limit, outward=outward)
 
     def numbers(self) -> Table:
-        """The cells that hold points."""
+        """Return the cells that hold points."""
         if self._grid is None:
             return {}
         deviation_mm, counts = 1000 * self._grid.deviation, self._grid.n_points
@@ -246,7 +246,7 @@ class ScaleStrip(QWidget):
 
 
 def _text_of(grid: DeviationGrid, chainage: float, clock: float) -> str:
-    """What is said of a place on the map."""
+    """Return the readout of a place on the map."""
     cell = grid.cell(chainage, clock)
     if cell is None:
         return ""

@@ -42,7 +42,7 @@ class PreviewView(Chart):
     """Row of a stack in the plan, and a profile's index or None."""
     step_requested = Signal(int)
     seen = Signal(bool)
-    """Whether anybody looks: what nobody sees need not be cut."""
+    """Whether it is seen: what nobody sees need not be cut."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(tr(EMPTY), parent)
@@ -151,7 +151,7 @@ class PreviewView(Chart):
         return f"{text}<br>{self.summary.text()}"
 
     def numbers(self) -> Table:
-        """The points with the number of their curve, empty for points of none."""
+        """Return the points with the number of their curve, empty for points of none."""
         preview = self.state.preview
         if preview is None:
             return {}
@@ -176,12 +176,12 @@ class PreviewView(Chart):
         self.step_requested.emit(step)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
-        """Tell that somebody looks."""
+        """Signal that the preview is seen."""
         super().showEvent(event)
         self.seen.emit(True)
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802
-        """Tell that nobody looks any more."""
+        """Signal that the preview is hidden."""
         super().hideEvent(event)
         self.seen.emit(False)
 
@@ -237,7 +237,7 @@ def summary_of(preview: "ProfilePreview") -> str:
 
 
 def _by_colour(curve: np.ndarray) -> list[tuple[QColor, np.ndarray]]:
-    """Rows of the points by the colour of their curve; those of none first, in grey."""
+    """Return the rows of the points by the colour of their curve; those of none first, in grey."""
     groups = [(faint(theme.colour("muted"), 0.6), np.flatnonzero(curve < 0))]
     for number, rgb in enumerate(QUALITATIVE):
         rows = np.flatnonzero((curve >= 0) & (curve % len(QUALITATIVE) == number))

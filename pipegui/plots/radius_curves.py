@@ -56,7 +56,7 @@ def range_of(values: Array, fitted: Array, curve: Curve) -> tuple[float, float] 
 
 
 def table_of(curves: Sequence[Curve]) -> Table:
-    """The profiles of the elements, one after the other."""
+    """Return the profiles of the elements, one element after the other."""
     table: dict[str, list[str]] = {}
 
     def put(title: str, values: Array | NDArray[np.int32], decimals: int) -> None:
@@ -85,7 +85,7 @@ def key_of(sign: str, colour: QColor, text: str) -> str:
 
 
 def row_text(profiles: Profiles, row: int) -> str:
-    """What is said of the profile under the cursor."""
+    """Return the readout of a profile."""
     radius = format_measure(free_radius_mm(profiles)[row], 1000 * profiles.radius_sd[row], "mm")
     centre = format_measure(1000 * profiles.centre_deviation[row], unit="mm")
     index, chainage = profiles.profile_index[row], profiles.chainage[row]
@@ -106,7 +106,7 @@ def legend(
     shows: Callable[[str], bool],
     limit: DentLimit | None,
 ) -> str:
-    """What the lines and points of the plot are, as rich text."""
+    """Return the legend of the plot, as rich text."""
     pattern, data = curve.pattern_mm, curve.colour
     spread = format_measure(pattern.scatter, unit="mm", decimals=2)
     scatter = tr("scatter ± {spread}").format(spread=spread)

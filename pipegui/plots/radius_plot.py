@@ -130,7 +130,7 @@ class RadiusPlot(Chart):
         self.canvas.parentWidget().layout().insertWidget(1, self.key)
 
     def _inside_title(self, plot: pg.PlotItem, text: str) -> QGraphicsSimpleTextItem:
-        """A title inside the plot: beside its axis there is no room in a small panel."""
+        """Return a title inside the plot: at its axis there is no room in a small panel."""
         title = QGraphicsSimpleTextItem(text, plot.vb)
         title.setFont(small(self.font()))
         title.setPos(SPACE, 0)
@@ -174,7 +174,7 @@ class RadiusPlot(Chart):
     # Kept from one session to the next
 
     def choices(self) -> dict[str, Any]:
-        """What is plotted against what."""
+        """Return what is plotted against what."""
         against = list(X_AXES)[self.x_axis.currentIndex()]
         return {"shown": self.shown_menu.shown, "against": against}
 
@@ -187,7 +187,7 @@ class RadiusPlot(Chart):
     # Numbers
 
     def shows(self, name: str) -> bool:
-        """Whether one of `SERIES` is shown."""
+        """Return whether one of `SERIES` is shown."""
         return self.shown_menu.shows(name)
 
     @property
@@ -321,7 +321,7 @@ class RadiusPlot(Chart):
             drawing.draw_mark(plot, curve.x[rows[0]], float(self._values(plot, curve)[rows[0]]))
 
     def _values(self, plot: pg.PlotItem, curve: Curve) -> Array:
-        """The points that a plot shows of a curve."""
+        """Return the values that a plot shows of a curve."""
         if plot is self.radius:
             return self._level(curve, curve.pattern_mm.values)
         if plot is self.offset:
@@ -372,7 +372,7 @@ class RadiusPlot(Chart):
         return f"<b>{name}</b> · {self.stacks.currentText()}<br>{self.key.text()}"
 
     def numbers(self) -> Table:
-        """The profiles of the element and of the pinned ones."""
+        """Return the profiles of the element and of the pinned ones."""
         return table_of([self._curve, *self._pinned] if self._curve is not None else [])
 
     # Mouse

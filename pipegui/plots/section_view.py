@@ -147,7 +147,7 @@ class SectionView(Chart):
     # Kept from one session to the next
 
     def choices(self) -> dict[str, Any]:
-        """What is drawn, and how much deviations are enlarged."""
+        """Return what is drawn, and how much deviations are enlarged."""
         return {"shown": self.layer_menu.shown, "exaggeration": self.factor.value()}
 
     def choose(self, choices: Mapping[str, Any]) -> None:
@@ -306,13 +306,13 @@ class SectionView(Chart):
     # Copying
 
     def heading(self) -> str:
-        """What section it is, and its dimensions."""
+        """Return the section's name and dimensions."""
         element = self.state.element
         name = "" if element is None else label_of(element)
         return f"<b>{name}</b> · {self.title.text()}<br>{self.dimensions.text()}"
 
     def numbers(self) -> Table:
-        """The points, with their distance from the undeformed contour and the curve there."""
+        """Return the points with their distance from the undeformed contour and the curve there."""
         section = self.state.section
         if section is None:
             return {}
@@ -364,7 +364,7 @@ class SectionView(Chart):
         return None if away[nearest] > HOVER_PX else section.points_uv[nearest : nearest + 1]
 
     def _spot_of(self, point: Array) -> tuple[float, float] | None:
-        """Where on the element that is, if the section is square to its axis."""
+        """Return chainage and clock of a point, if the section is square to the axis."""
         profile, section = self.state.profile, self.state.section
         if profile is None or section is None or int(profile.stack_id[0]) != OWN_STACK:
             return None
@@ -387,13 +387,13 @@ def _points_colour() -> QColor:
 
 
 def _is_around(ellipse: SectionEllipse, reference: SectionEllipse) -> bool:
-    """Whether the reference's centre lies well inside an ellipse: else it has no rays to it."""
+    """Return whether the reference's centre lies well inside an ellipse: else no rays meet it."""
     offset = np.subtract(ellipse.centre_uv, reference.centre_uv)
     return bool(np.linalg.norm(offset) < 0.5 * ellipse.semi_minor)
 
 
 def _outward_anchor(place: Array, reference: SectionEllipse) -> tuple[float, float]:
-    """Where a label has its anchor so that it stands outside of a place on the contour."""
+    """Return the anchor of a label that stands outside of a place on the contour."""
     u, v = place - np.asarray(reference.centre_uv)
     reach = max(abs(u), abs(v), 1e-9)
     return 0.5 - 0.62 * u / reach, 0.5 + 0.9 * v / reach

@@ -42,7 +42,7 @@ class SeriesMenu(QMenu):
             action.toggled.connect(lambda _: self.changed.emit())
 
     def shows(self, name: str) -> bool:
-        """Whether one of the series is to be shown."""
+        """Return whether a series is to be shown."""
         return self.series[name].isChecked()
 
     @property

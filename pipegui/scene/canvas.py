@@ -34,7 +34,7 @@ SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "microsoft basic re
 
 LEFT, MIDDLE = Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton
 Drag = Callable[[QPointF, bool], None]
-"""Told where the mouse is, and whether the button was let go there."""
+"""Called with where the mouse is, and whether the button was released there."""
 SHIFT = Qt.KeyboardModifier.ShiftModifier
 
 
@@ -195,7 +195,7 @@ class Canvas(QVTKRenderWindowInteractor):
         return float(self.width() / max(self.height(), 1))
 
     def projection(self) -> Projection:
-        """The present mapping from local coordinates to the widget's pixels."""
+        """Return the present mapping from local coordinates to the widget's pixels."""
         self._place_camera()
         near, far = self._camera.GetClippingRange()
         to_clip = self._camera.GetCompositeProjectionTransformMatrix(self.aspect, near, far)

@@ -71,10 +71,10 @@ def drag(
 
 
 def _along(projection: Projection, anchor: Array, axis: int, cursor: tuple[float, float]) -> float:
-    """How far along an axis from `anchor` the point is that comes nearest to the ray."""
+    """Return how far along an axis from `anchor` the point nearest to the ray lies, metres."""
     origin, ray = projection.ray(*cursor)
     cosine = ray[axis]
-    if abs(cosine) > 0.999:  # looking along the axis: nothing there tells how far
+    if abs(cosine) > 0.999:  # looking along the axis: the distance is not determined
         return 0.0
     offset = anchor - origin
     return float((cosine * (ray @ offset) - offset[axis]) / (1 - cosine**2))
@@ -117,7 +117,7 @@ class BoxFrame:
 
 
 def is_shown(box: Box | None, point: Array) -> bool:
-    """Whether a point is seen: there is no box, or it is on the side that is shown."""
+    """Return whether a point is seen: there is no box, or it is on the side that is shown."""
     if box is None:
         return True
     return bool(((point >= box.low) & (point <= box.high)).all()) != box.is_inverted

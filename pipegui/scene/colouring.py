@@ -141,7 +141,7 @@ def _share(values: NDArray[np.floating], limits: tuple[float, float]) -> NDArray
 
 @cached_with_owner(maxsize=2)
 def _apart(result: Result, cloud: PointCloud, colour_by: ColourBy) -> NDArray[np.intp]:
-    """Index into `QUALITATIVE` for each id."""
+    """Return an index into `QUALITATIVE` for each id; neighbours get different ones."""
     ids = _ids(result, colour_by)
     pairs = neighbouring_ids(cloud.xyz, ids)
     return colour_apart(int(ids.max(initial=0)), pairs, len(QUALITATIVE))
@@ -220,7 +220,7 @@ def profile_rows(cloud: PointCloud, stack: Stack, profile_index: int) -> NDArray
     start = stack.offset + profile_index * stack.width
     # In the points' own type: as float64 they would take room twice over.
     direction: NDArray[np.floating] = stack.direction.astype(cloud.xyz.dtype)
-    # In blocks: beside a large cloud there is no room for a number for each point.
+    # In blocks: with a large cloud there is no memory for a number for each point.
     found = []
     for first in range(0, len(cloud), BLOCK):
         along = np.dot(cloud.xyz[first : first + BLOCK], direction)

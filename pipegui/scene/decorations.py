@@ -1,4 +1,4 @@
-"""What is drawn beside the points: axes, ellipses, surfaces and the selection, as actors."""
+"""Actors besides the points: axes, ellipses, surfaces and the selection."""
 
 from collections.abc import Iterable
 
@@ -155,7 +155,7 @@ class Decorations:
             yield 1, _lines(shapes.end_rings(each), accent, 2.0)
 
     def _stack_profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
-        """The one profile of a stack: its curves in their colours, and its ellipses."""
+        """Yield the one profile of a stack: its points in their colours, and its ellipses."""
         cloud, result, view = state.cloud, state.result, state.view
         if cloud is None or result is None or view.shown_profile is None:
             return
@@ -197,7 +197,7 @@ def _thinned(profiles: Profiles) -> Profiles:
 
 
 def selected_element(state: SceneState) -> Element | None:
-    """The selected element, if there is one."""
+    """Return the selected element, if there is one."""
     selected = state.selection.element_id
     if state.result is None or not selected:
         return None

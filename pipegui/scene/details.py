@@ -1,4 +1,4 @@
-"""Which points of a large cloud to draw, found beside the window.
+"""Which points of a large cloud to draw, found in a thread of its own.
 
 Full density where one looks: once the camera rests, all points in the picture.
 """

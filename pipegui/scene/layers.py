@@ -132,7 +132,7 @@ class Layers(QObject):
             )
 
     def pick(self, position: QPointF, *, quick: bool = False) -> int:
-        """Index in the cloud of the point seen at `position`, -1 for none.
+        """Return the index in the cloud of the point seen at `position`, -1 for none.
 
         Quick is among those points only that are drawn while the camera moves.
         """
@@ -167,7 +167,7 @@ class Layers(QObject):
         return visible_points(state.cloud, state.result, state.view.hidden_elements, box)
 
     def _sample(self, box: Box | None) -> NDArray[np.int32] | None:
-        """Rows that are to be seen, of so many that this takes no time; None: all are."""
+        """Return the visible rows of a sample small enough to take no time; None: all are."""
         state = self._state
         if state.cloud is None or (box is None and not state.view.hidden_elements):
             return None

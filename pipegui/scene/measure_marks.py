@@ -21,7 +21,7 @@ END = 5.0
 
 @dataclass(frozen=True)
 class MeasureMark:
-    """A measurement with what is written beside it; `number` is -1 for one not yet finished."""
+    """A measurement with its label; `number` is -1 for one not yet finished."""
 
     number: int
     measurement: Measurement

@@ -106,7 +106,7 @@ class SceneOverlay(QWidget):
         return next((i for box, i in self._targets if box.contains(position)), 0)
 
     def measurement_at(self, position: QPointF) -> int:
-        """Number of the measurement whose closing cross is there, or -1."""
+        """Return the number of the measurement whose closing cross is there, or -1."""
         return next((i for box, i in self.crosses if box.contains(position)), -1)
 
     def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
@@ -207,7 +207,7 @@ class SceneOverlay(QWidget):
         self._targets = [(box, self.labels[i].deformation_id) for box, i in self._targets]
 
     def _spots(self, projection: Projection) -> list[QRectF]:
-        """Where the labels point at, which nothing written must cover."""
+        """Return the places that labels point at, which no text must cover."""
         if not self.labels:
             return []
         pixels, _ = projection.to_screen(np.array([label.anchor for label in self.labels]))

@@ -104,7 +104,7 @@ class PointLayer:
         return [s.xyz for s in self.slices if s.stop <= MOVING_LEVEL] or self.parts[:1]
 
     def cloud_index(self, row: int) -> int:
-        """Index in the cloud of a row of `parts`, counted through."""
+        """Return the index in the cloud of a row of `parts`, counted through."""
         for part in self.slices:
             if row < part.stop:
                 return int(part.rows[row - part.stop + len(part.rows)])
@@ -256,7 +256,7 @@ def set_planes(actor: vtkActor, box: Box | None) -> None:
 
 @cached_with_owner(maxsize=1)
 def _spacing_of(cloud: PointCloud) -> float:
-    """Three layers show the same cloud."""
+    """Return the spacing of a cloud's points, metres; three layers ask for it."""
     return estimate_spacing(cloud.xyz)
 
 

@@ -62,18 +62,18 @@ class Projection:
         return cls(matrix, 0.0, 2 * np.tan(view_angle / 2) / height)
 
     def to_screen(self, points: Array) -> tuple[Array, Array]:
-        """Pixels (n, 2) and depths (n,) of `points` (n, 3); nan behind the camera."""
+        """Return pixels (n, 2) and depths (n,) of points (n, 3); nan behind the camera."""
         points = np.atleast_2d(points)
         u, v, depth, w = self.matrix @ np.column_stack([points, np.ones(len(points))]).T
         w = np.where((w > 0) & (depth > 0), w, np.nan)
         return np.column_stack([u / w, v / w]), depth
 
     def pixel_size(self, depth: float) -> float:
-        """Size in metres of a pixel at `depth`."""
+        """Return the size in metres of a pixel at `depth`."""
         return self.pixel_at_zero + self.pixel_per_depth * depth
 
     def ray(self, u: float, v: float) -> tuple[Array, Array]:
-        """Origin and unit direction of the ray through the pixel (u, v)."""
+        """Return origin and unit direction of the ray through the pixel (u, v)."""
         # Two planes of points that map to u and to v meet in the ray.
         plane_u = self.matrix[0] - u * self.matrix[3]
         plane_v = self.matrix[1] - v * self.matrix[3]

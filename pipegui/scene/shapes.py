@@ -21,7 +21,7 @@ def ellipse_lines(profiles: Profiles) -> pv.PolyData:
 
 
 def ellipses(profiles: Profiles, n_around: int = N_AROUND) -> Array:
-    """Points along the ellipses of `profiles`, closed, shape (m, n_around + 1, 3)."""
+    """Return points along the ellipses of `profiles`, closed, shape (m, n_around + 1, 3)."""
     t = np.linspace(0, 2 * np.pi, n_around + 1)[None, :, None]
     minor_direction = np.cross(profiles.normal, profiles.major_direction)
     major = (profiles.semi_major[:, None] * profiles.major_direction)[:, None, :]
@@ -56,7 +56,7 @@ def surfaces(elements: tuple[Element, ...]) -> pv.PolyData:
 
 
 def outline(elements: tuple[Element, ...]) -> Array:
-    """Points that surround `elements`: what has to be in view to see them, shape (n, 3)."""
+    """Return points around `elements` that have to be in view to see them, shape (n, 3)."""
     points = [np.empty((0, 3))]
     for e in elements:
         if e.kind is ElementKind.SPHERE:

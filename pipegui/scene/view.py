@@ -197,7 +197,7 @@ class SceneView(QWidget):
         self._aim(self._state)
 
     def camera(self) -> dict[str, list[float]]:
-        """Where the camera is, to be kept in a file."""
+        """Return where the camera is, to be saved in a file."""
         pose = self.canvas.pose
         return {
             "focus": pose.focus.tolist(),
@@ -205,7 +205,7 @@ class SceneView(QWidget):
         }
 
     def set_camera(self, camera: Mapping[str, list[float]]) -> None:
-        """Go where the camera was; stay if that is not told."""
+        """Go where the camera was; stay if that is not known."""
         focus, look = np.array(camera.get("focus", ())), camera.get("look", ())
         if focus.shape == (3,) and len(look) == 3 and look[0] > 0:
             distance, heading, elevation = look
@@ -223,7 +223,7 @@ class SceneView(QWidget):
         self.overlay.update()
 
     def view_direction(self) -> Array:
-        """Unit vector in which the camera looks."""
+        """Return the unit vector in which the camera looks."""
         return self.canvas.pose.forward
 
     def _fitted(self, pose: Pose) -> Pose:
@@ -292,7 +292,7 @@ class SceneView(QWidget):
     # Mouse
 
     def pick(self, position: QPointF) -> int:
-        """Index in the cloud of the point that is seen at `position`, -1 if there is none."""
+        """Return the index in the cloud of the point seen at `position`, -1 if there is none."""
         return self.layers.pick(position)
 
     def _point_under(self, position: QPointF) -> Array | None:

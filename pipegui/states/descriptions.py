@@ -1,4 +1,4 @@
-"""What is said of things on screen: summaries, properties, hover texts. Qt-free."""
+"""Texts that describe what is on screen: summaries, properties, hover texts. Qt-free."""
 
 import math
 from collections import Counter
@@ -76,7 +76,7 @@ def _measure(
 
 
 def point_count(n_points: int) -> str:
-    """A rounded count of points: "4.3 M points"."""
+    """Return a rounded count of points: "4.3 M points"."""
     if n_points >= 999_950:
         return tr("{n:.1f} M points").format(n=n_points / 1e6)
     if n_points >= 10_000:
@@ -85,12 +85,12 @@ def point_count(n_points: int) -> str:
 
 
 def deformation_name(deformation: Deformation) -> str:
-    """What a deformation is called: "Dent 3"."""
+    """Return the name of a deformation: "Dent 3"."""
     return f"{first_capital(tr(deformation.kind))} {deformation.deformation_id}"
 
 
 def summary(result: Result) -> str:
-    """A line such as "23 pipes in 7 runs, 5 deformations, 2 to reject"."""
+    """Return a line such as "23 pipes in 7 runs, 5 deformations, 2 to reject"."""
     if not result.elements:
         return tr("No pipes found")
     n_pipes = sum(e.kind is ElementKind.CYLINDER for e in result.elements)
@@ -107,7 +107,7 @@ def summary(result: Result) -> str:
 
 
 def to_do(verdicts: Mapping[Verdict, int]) -> Iterator[str]:
-    """How many there are of the verdicts that ask for something: "2 to reject"."""
+    """Yield how many verdicts ask for something: "2 to reject"."""
     texts = {Verdict.REJECT: mark("{n} to reject"), Verdict.REVIEW: mark("{n} to review")}
     for verdict, text in texts.items():
         if verdicts[verdict]:
@@ -115,23 +115,23 @@ def to_do(verdicts: Mapping[Verdict, int]) -> Iterator[str]:
 
 
 def coordinates(cloud: PointCloud, point_index: int) -> str:
-    """World coordinates of a point: "E 432 105.214  N 6 201 877.530  H 112.031"."""
+    """Return world coordinates of a point: "E 432 105.214  N 6 201 877.530  H 112.031"."""
     return "   ".join(coordinate_lines(cloud, cloud.xyz[point_index]))
 
 
 def axis_names(cloud: PointCloud) -> str:
-    """What the axes are called: east, north and height, where the cloud is on a map."""
+    """Return the names of the axes: east, north and height, where the cloud is on a map."""
     return "ENH" if cloud.crs or np.abs(cloud.origin).max() > 1e4 else "XYZ"
 
 
 def coordinate_lines(cloud: PointCloud, local: Array) -> tuple[str, ...]:
-    """World coordinates of a local point, one after the other with their names."""
+    """Return the world coordinates of a local point, each with its name."""
     named = zip(axis_names(cloud), cloud.world(local), strict=True)
     return tuple(f"{name} {format_coordinate(float(value))}" for name, value in named)
 
 
 def hover_text(scan: Scan, point_index: int) -> str:
-    """What is under the cursor: name, radius, deviation; "" where nothing was detected."""
+    """Return name, radius and deviation under the cursor; "" where nothing was detected."""
     result = scan.result
     element_id = NO_ID if result is None else int(result.element_id[point_index])
     if result is None or element_id == NO_ID:
@@ -146,12 +146,12 @@ def hover_text(scan: Scan, point_index: int) -> str:
 
 
 def radius_text(element: Element) -> str:
-    """Radius with its uncertainty."""
+    """Return the radius with its uncertainty."""
     return format_measure(1000 * element.radius, 1000 * element.radius_sd, "mm")
 
 
 def title(result: Result | None, selection: Selection) -> str:
-    """What is selected: "Pipe 2 · dent 1"."""
+    """Return what is selected: "Pipe 2 · dent 1"."""
     if result is None or selection == Selection():
         return ""
     if not selection.element_id:
@@ -168,7 +168,7 @@ def title(result: Result | None, selection: Selection) -> str:
 
 
 def properties(state: PropertiesState) -> list[Property | Heading]:
-    """The properties of the selection, the innermost thing first."""
+    """Return the properties of the selection, the innermost thing first."""
     scan, selection = state.scan, state.selection
     if scan is None:
         return []
@@ -275,7 +275,7 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
 
 
 def _of_settings(own: Settings, others: Settings) -> Property:
-    """What is different in the settings with which an element was detected again."""
+    """Return what is different in the settings with which an element was detected again."""
     lines = [
         f"{tr(spec.label)}: {_setting(own, key, spec)} ({_setting(others, key, spec)})"
         for key, spec in iterate_fields()

@@ -20,7 +20,7 @@ class PlanningState:
 
 @dataclass(frozen=True)
 class PlanState:
-    """What a detection would cut, or a word on why it is not known."""
+    """What a detection would cut, or why it is not known."""
 
     plan: "Plan | None" = None
     message: str = ""

@@ -369,7 +369,7 @@ def _element_states(
 
 @cached_with_owner(maxsize=8)
 def _section(result: Result, cloud: PointCloud, element_id: int, key: ProfileKey) -> SectionState:
-    """The section of a profile of the element."""
+    """Return the section of a profile of the element."""
     profile = result_queries.profile_at(result, element_id, key)
     assert profile is not None
     element, chainage = result.element(element_id), float(profile.chainage[0])

@@ -81,7 +81,7 @@ def choose(appearance: Appearance) -> None:
 
 
 def is_dark() -> bool:
-    """Whether the user, or else the system, asks for dark colours."""
+    """Return whether the user, or else the system, asks for dark colours."""
     if _Chosen.appearance is Appearance.SYSTEM:
         return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
     return _Chosen.appearance is Appearance.DARK

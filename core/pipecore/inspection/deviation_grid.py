@@ -62,7 +62,20 @@ class DeviationGrid:
 
 
 def clock_from(clock: Array | float, centre: float = 0.0) -> Array:
-    """Return clock angles as angles from another one, -π … π, radians."""
+    """Return clock angles as angles from another one.
+
+    Parameters
+    ----------
+    clock : ndarray or float
+        Radians.
+    centre : float
+        The clock angle that counts as zero, radians.
+
+    Returns
+    -------
+    ndarray
+        -π … π, of the shape of `clock`.
+    """
     return np.asarray(np.mod(np.asarray(clock) - centre + np.pi, 2 * np.pi) - np.pi)
 
 
