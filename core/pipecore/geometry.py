@@ -72,7 +72,7 @@ class Axis(Protocol):
 
     @property
     def numbers(self) -> Array:
-        """The axis as `pipecore._kernels.axes` takes it, shape (17,)."""
+        """The axis as `pipecore._kernels.pipe_coordinates` takes it, shape (17,)."""
         ...
 
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from skimage.measure import EllipseModel
 
-from pipecore._kernels.ellipses import N_FIT_COLUMNS, fit_curves
+from pipecore._kernels.curve_fits import CurveFits, CurveLimits, fit_curves
 from pipecore.ellipses import fit_direct_ellipses, radius_sd_factor
 from pipecore.ellipses.distances import orthogonal_distances
 from pipecore.ellipses.nonlinear import fit_nonlinear_ellipse
@@ -71,13 +71,14 @@ def _errors(arc_deg: int, n: int) -> dict[str, Any]:
     normals /= np.linalg.norm(normals, axis=2, keepdims=True)
 
     flat, starts = points.reshape(-1, 2), np.arange(0, (n + 1) * N_POINTS, N_POINTS)
-    fits = np.empty((n, N_FIT_COLUMNS))
-    fit_curves(flat, normals.reshape(-1, 3), starts, 0, n, 3 * SIGMA, 0.04, 0.0, np.inf, fits)
+    fits = CurveFits.empty(n)
+    limits = CurveLimits(3 * SIGMA, max_gap=0.04, min_cos_tilt=0.0, max_off_axis=np.inf)
+    fit_curves(flat, normals.reshape(-1, 3), starts, 0, n, limits, fits)
     free = [fit_nonlinear_ellipse(p, max_sd_share=np.inf) for p in points]
     robust = [fit_nonlinear_ellipse(p, robust=True, max_sd_share=np.inf) for p in points]
     gated = [fit_nonlinear_ellipse(p) for p in points]
     radii = {
-        CIRCLE: fits[:, 5],
+        CIRCLE: fits.radius,
         NONLINEAR: [f.semi_minor if f else np.nan for f in free],
         ROBUST: [f.semi_minor if f else np.nan for f in robust],
         DIRECT: fit_direct_ellipses(flat, starts).semi_minor,

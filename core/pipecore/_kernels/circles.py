@@ -7,9 +7,14 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def taubin_circle(x, y, weights):
-    """Circle by Taubin's method (Newton iteration of Chernov): centre x, y and radius.
+    """Return the circle through points by Taubin's method: centre x, y and radius.
 
-    nan if the points carry no circle.
+    Newton iteration of Chernov & Lesort (2005); nan if the points define no circle.
+
+    Parameters
+    ----------
+    x, y (n,) : any unit of length
+    weights (n,) : not negative
     """
     n = x.shape[0]
     total = mx = my = 0.0
@@ -68,17 +73,30 @@ def taubin_circle(x, y, weights):
 
 @njit(cache=True, nogil=True)
 def tukey_weight(residual, reach):
-    """Weight of Tukey's biweight, zero from `reach` on."""
+    """Return the weight of Tukey's biweight, (1 - (r/c)²)² and 0 from r = c on.
+
+    Parameters
+    ----------
+    residual : r
+    reach : c, in the unit of the residual
+    """
     q = residual / reach
     return (1.0 - q * q) ** 2 if abs(q) < 1.0 else 0.0
 
 
 @njit(cache=True, nogil=True)
 def geometric_circle(x, y, cx, cy, r, reach, weights, n_iterations):
-    """Refine a circle by iteratively reweighted geometric least squares.
+    """Refine a circle by iteratively reweighted geometric least squares; return centre and radius.
 
-    Residuals are signed distances; points `reach` or further from the circle weigh
-    nothing. Writes the last weights. Returns centre, radius; nan if it diverges.
+    Residuals are signed distances; nan where the normal equations are singular.
+
+    Parameters
+    ----------
+    x, y (n,) : any unit of length
+    cx, cy, r : circle to start from
+    reach : distance from which points have no weight; inf for equal weights
+    weights (n,) : filled with the last weights
+    n_iterations : most iterations
     """
     n = x.shape[0]
     for _ in range(n_iterations):
@@ -146,7 +164,13 @@ def geometric_circle(x, y, cx, cy, r, reach, weights, n_iterations):
 
 @njit(cache=True, nogil=True)
 def covered_arc(angles, max_gap):
-    """Arc that sorted angles cover; gaps up to `max_gap` count as covered."""
+    """Return the arc that angles cover, radians.
+
+    Parameters
+    ----------
+    angles (n,) : ascending, radians
+    max_gap : gaps up to this count as covered, radians
+    """
     n = angles.shape[0]
     uncovered = 0.0
     for i in range(n):

@@ -7,9 +7,14 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def scaled_moments(points, starts, mean, scale, moments):
-    """Write the mean of each group, its scatter, and the sums of its scaled points' powers.
+    """Write the mean and scatter of each group of points, and the sums of powers once scaled.
 
-    `moments` (m, 15) holds Σ xⁱyʲ by i + j and then by j: 1, x, y, x², xy, y² … y⁴.
+    Parameters
+    ----------
+    points (n, 2) : grouped, any unit of length
+    starts (m + 1,) : where each group begins
+    mean (m, 2), scale (m,) : filled with mean and root mean square distance from it
+    moments (m, 15) : filled with Σ xⁱyʲ by i + j and then by j: 1, x, y, x², xy, y² … y⁴
     """
     for g in range(starts.shape[0] - 1):
         first, last = starts[g], starts[g + 1]
@@ -45,10 +50,17 @@ def scaled_moments(points, starts, mean, scale, moments):
 
 @njit(cache=True, nogil=True)
 def sampson_sums(points, starts, mean, scale, conics, sums):
-    """Write the sum of each group's squared distances from its conic to first order, F² / |∇F|².
+    """Write the sum of each group's squared Sampson distances from its conic, F² / |∇F|².
 
-    A conic (m, 6) is a x² + b xy + c y² + d x + e y + f of the scaled points, whose
-    distances are summed too.
+    Points and sums are scaled as by `scaled_moments`.
+
+    Parameters
+    ----------
+    points (n, 2) : grouped, any unit of length
+    starts (m + 1,) : where each group begins
+    mean (m, 2), scale (m,) : of each group
+    conics (m, 6) : a x² + b xy + c y² + d x + e y + f of the scaled points
+    sums (m,) : filled; nan where the conic is
     """
     for g in range(starts.shape[0] - 1):
         a, b, c = conics[g, 0], conics[g, 1], conics[g, 2]

@@ -9,7 +9,12 @@ _TINY = 1e-300
 
 @njit(cache=True, nogil=True)
 def eigenvalues(xx, xy, xz, yy, yz, zz):
-    """Eigenvalues in ascending order (closed form by Smith, 1961)."""
+    """Return the eigenvalues of a symmetric matrix in ascending order (closed form, Smith 1961).
+
+    Parameters
+    ----------
+    xx, xy, xz, yy, yz, zz : the matrix
+    """
     off = xy * xy + xz * xz + yz * yz
     q = (xx + yy + zz) / 3.0
     p2 = (xx - q) ** 2 + (yy - q) ** 2 + (zz - q) ** 2 + 2.0 * off
@@ -42,7 +47,13 @@ _S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11, _S12, _S13, _S14, 
 
 @njit(cache=True, nogil=True, inline="always")
 def longer(x, y, z, length2, u, v, w):
-    """Return the longer of two vectors and its squared length; that of the first is known."""
+    """Return the longer of two vectors and its squared length.
+
+    Parameters
+    ----------
+    x, y, z, length2 : the first vector and its squared length
+    u, v, w : the second vector
+    """
     other = u * u + v * v + w * w
     is_longer = other > length2
     x = u if is_longer else x
@@ -53,10 +64,14 @@ def longer(x, y, z, length2, u, v, w):
 
 @njit(cache=True, nogil=True, inline="always")
 def least_eigenpair(xx, xy, xz, yy, yz, zz):
-    """Smallest eigenvalue and its unit eigenvector, nan if it is multiple.
+    """Return the smallest eigenvalue of a symmetric matrix and its unit eigenvector.
 
-    As `eigenvalues` and `eigenvector` tell, but without branches and calls and put into the
-    loop that wants it, which then looks at several matrices at a time.
+    As `eigenvalues` and `eigenvector` give them, nan if it is multiple; without branches and
+    calls and inlined, so that the loop around it handles several matrices at a time.
+
+    Parameters
+    ----------
+    xx, xy, xz, yy, yz, zz : the matrix
     """
     q = (xx + yy + zz) / 3.0
     bxx, byy, bzz = xx - q, yy - q, zz - q
@@ -83,9 +98,14 @@ def least_eigenpair(xx, xy, xz, yy, yz, zz):
 
 @njit(cache=True, nogil=True)
 def eigenvector(xx, xy, xz, yy, yz, zz, value):
-    """Unit eigenvector of an eigenvalue: the longest cross product of two rows of A - value·I.
+    """Return the unit eigenvector of an eigenvalue, nan if the eigenvalue is multiple.
 
-    nan if the eigenvalue is multiple.
+    It is the longest cross product of two rows of A - value·I.
+
+    Parameters
+    ----------
+    xx, xy, xz, yy, yz, zz : the matrix A
+    value : the eigenvalue
     """
     a0, a1, a2 = xx - value, xy, xz
     b0, b1, b2 = xy, yy - value, yz

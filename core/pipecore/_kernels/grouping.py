@@ -6,7 +6,14 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def group_into(labels, n_labels, members):
-    """Write indices of the items in order of their label; return where each label starts."""
+    """Write the indices of items in the order of their label; return where each label begins.
+
+    Parameters
+    ----------
+    labels (n,) : 0 … n_labels - 1
+    n_labels : number of labels
+    members (n,) : filled
+    """
     starts = np.zeros(n_labels + 1, np.int64)
     for label in labels:
         starts[label + 1] += 1
@@ -21,14 +28,28 @@ def group_into(labels, n_labels, members):
 
 @njit(cache=True, nogil=True)
 def group_by_label(labels, n_labels):
-    """Indices of the items in order of their label, and where each label starts."""
+    """Return the indices of items in the order of their label, and where each label begins.
+
+    Parameters
+    ----------
+    labels (n,) : 0 … n_labels - 1
+    n_labels : number of labels
+    """
     members = np.empty(labels.shape[0], np.int64)
     return members, group_into(labels, n_labels, members)
 
 
 @njit(cache=True, nogil=True)
 def spread_to_members(values, members, starts, first, last, spread_out):
-    """Write the value of each group first … last to all of its members."""
+    """Write the value of each of some groups to all of its members.
+
+    Parameters
+    ----------
+    values (groups,) : one for each group
+    members (n,), starts (groups + 1,) : the members group by group, and where each begins
+    first, last : range of groups
+    spread_out (n,) : filled at the members
+    """
     for k in range(first, last):
         for m in range(starts[k], starts[k + 1]):
             spread_out[members[m]] = values[k]
@@ -36,7 +57,18 @@ def spread_to_members(values, members, starts, first, last, spread_out):
 
 @njit(cache=True, nogil=True)
 def group_from(labels, first, n_labels):
-    """Do as `group_by_label` for labels from `first` on, leaving out items of smaller ones."""
+    """Return the indices of items in the order of their label, of labels from `first` on.
+
+    Parameters
+    ----------
+    labels (n,) : below first + n_labels
+    first : items of smaller labels are left out
+    n_labels : number of labels
+
+    Returns
+    -------
+    Indices, and where each label begins, counted from `first`.
+    """
     starts = np.zeros(n_labels + 1, np.int64)
     for label in labels:
         if label >= first:
@@ -55,7 +87,14 @@ def group_from(labels, first, n_labels):
 
 @njit(cache=True, nogil=True)
 def group_large(labels, n_labels, min_size):
-    """Members of the groups of at least `min_size` items in order, and where each starts."""
+    """Return the members of groups of at least a given size, and where each group begins.
+
+    Parameters
+    ----------
+    labels (n,) : 0 … n_labels - 1
+    n_labels : number of labels
+    min_size : least number of items
+    """
     place = np.zeros(n_labels, np.int64)
     for label in labels:
         place[label] += 1
@@ -89,7 +128,12 @@ DIGIT_BITS = 11
 
 @njit(cache=True, nogil=True)
 def argsort_keys(keys):
-    """Stable order of int64 keys, none negative, by a radix sort from the lowest digits up."""
+    """Return the stable order of keys, by a radix sort from the lowest digits up.
+
+    Parameters
+    ----------
+    keys (n,) : int64, none negative
+    """
     n = keys.shape[0]
     largest = np.int64(0)
     for key in keys:

@@ -11,7 +11,12 @@ LEAST_PIVOT = 1e-10
 
 @njit(cache=True, nogil=True)
 def mirror(matrix):
-    """Write what stands below the diagonal above it."""
+    """Write what stands below the diagonal of a matrix above it.
+
+    Parameters
+    ----------
+    matrix (n, n) : changed
+    """
     for k in range(matrix.shape[0]):
         for m in range(k):
             matrix[m, k] = matrix[k, m]
@@ -19,7 +24,13 @@ def mirror(matrix):
 
 @njit(cache=True, nogil=True)
 def solve_in_place(normal, right):
-    """Solve a positive definite system by Cholesky's method; both are overwritten."""
+    """Solve a positive definite system by Cholesky's method.
+
+    Parameters
+    ----------
+    normal (p, p) : its lower triangle; overwritten
+    right (p,) : becomes the solution
+    """
     p = right.shape[0]
     for k in range(p):
         for m in range(k + 1):
@@ -39,9 +50,15 @@ def solve_in_place(normal, right):
 
 @njit(cache=True, nogil=True)
 def solve_step(normal, right, step):
-    """Solve for the step that lessens the residuals; False where the points do not carry one.
+    """Solve normal equations for a step; return False where they are singular.
 
-    By Cholesky's method: what a parameter adds to those before it must not be next to nothing.
+    By Cholesky's method, scaled to unit diagonal; see `LEAST_PIVOT`.
+
+    Parameters
+    ----------
+    normal (p, p) : JᵀJ
+    right (p,) : Jᵀr
+    step (p,) : filled with -(JᵀJ)⁻¹Jᵀr
     """
     p = right.shape[0]
     diagonal = np.empty(p)
@@ -76,7 +93,12 @@ def solve_step(normal, right, step):
 
 @njit(cache=True, nogil=True)
 def factorise_band(band):
-    """Turn a lower band of a positive definite matrix, band[j, i - j], into its Cholesky factor."""
+    """Turn a positive definite band matrix into its Cholesky factor.
+
+    Parameters
+    ----------
+    band (p, width) : lower band, band[j, i - j]; changed
+    """
     size, width = band.shape
     for j in range(size):
         root = math.sqrt(band[j, 0])
@@ -90,7 +112,13 @@ def factorise_band(band):
 
 @njit(cache=True, nogil=True)
 def solve_by_band(band, right):
-    """Solve by a factor of `factorise_band`; `right` becomes the solution."""
+    """Solve a system by the factor of its band matrix.
+
+    Parameters
+    ----------
+    band (p, width) : of `factorise_band`
+    right (p,) : becomes the solution
+    """
     size, width = band.shape
     for j in range(size):
         right[j] /= band[j, 0]
@@ -104,7 +132,13 @@ def solve_by_band(band, right):
 
 @njit(cache=True, nogil=True)
 def inverse_by_band(band, inverse):
-    """Write the whole inverse of a matrix with a factor of `factorise_band`."""
+    """Write the inverse of a matrix from the factor of its band.
+
+    Parameters
+    ----------
+    band (p, width) : of `factorise_band`
+    inverse (p, p) : filled
+    """
     inverse[:, :] = 0.0
     for i in range(inverse.shape[0]):
         inverse[i, i] = 1.0

@@ -7,15 +7,20 @@ from numba import njit
 
 from pipecore._kernels.grouping import group_by_label
 
-NEW = 1e-9
-"""A term adds something where the ones before it leave this share of it."""
+MIN_NEW_SHARE = 1e-9
+"""A term counts where the ones before it leave at least this fraction of it."""
 
 
 @njit(cache=True, nogil=True)
-def take_off(terms, values):
-    """Take from values (n,) what terms (n, p) explain by least squares; the terms are lost.
+def remove_explained(terms, values):
+    """Subtract from values what terms explain by least squares (modified Gram-Schmidt).
 
-    Modified Gram-Schmidt. Terms that are sums of the ones before them add nothing.
+    Terms that are sums of the ones before them add nothing.
+
+    Parameters
+    ----------
+    terms (n, p) : overwritten
+    values (n,) : become the residuals
     """
     n, p = terms.shape
     whole = np.zeros(p)
@@ -27,7 +32,7 @@ def take_off(terms, values):
         total = 0.0
         for i in range(n):
             total += terms[i, k] * terms[i, k]
-        if not total > NEW * NEW * whole[k]:
+        if not total > MIN_NEW_SHARE * MIN_NEW_SHARE * whole[k]:
             continue
         share[k:] = 0.0
         of_values = 0.0
@@ -42,16 +47,24 @@ def take_off(terms, values):
 
 
 @njit(cache=True, nogil=True)
-def look_at_sphere(xyz, chosen, centre, radius, n_sectors, n_around, n_high, least):
-    """How far chosen points leave a sphere, how high they reach over its centre, and their arc.
+def sphere_misfit(xyz, chosen, centre, radius, n_sectors, n_around, n_high, min_points):
+    """Return how far points leave a sphere, how high they reach over its centre, and their arc.
 
-    The misfit is the root mean square of the medians of patches of equal area: even steps of
-    height and of azimuth. Those of fewer than `least` points do not count; infinite where
-    none does. The arc is that of the sectors about the vertical that hold points.
+    The misfit is the root mean square of the medians of patches of equal area, even steps of
+    height and azimuth. The arc is that of the sectors about the vertical that hold points.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    chosen (m,) : indices of points
+    centre (3,), radius : of the sphere, metres
+    n_sectors : number of sectors about the vertical
+    n_around, n_high : numbers of patches in azimuth and height
+    min_points : patches of fewer points do not count
 
     Returns
     -------
-    misfit, low, high, arc : float
+    Misfit (infinite where no patch counts), lowest and highest point, metres, and arc, radians.
     """
     n = chosen.shape[0]
     patch, residual = np.empty(n, np.int64), np.empty(n)
@@ -71,7 +84,7 @@ def look_at_sphere(xyz, chosen, centre, radius, n_sectors, n_around, n_high, lea
     total, n_used = 0.0, 0
     for k in range(n_around * n_high):
         a, b = starts[k], starts[k + 1]
-        if b - a >= least:
+        if b - a >= min_points:
             middle = (b - a) // 2
             total += np.partition(residual[members[a:b]], middle)[middle] ** 2
             n_used += 1
@@ -80,11 +93,18 @@ def look_at_sphere(xyz, chosen, centre, radius, n_sectors, n_around, n_high, lea
 
 
 @njit(cache=True, nogil=True)
-def section_misfit(clock, residual, n_sectors, least, least_share, n_harmonics):
-    """How far the medians of sectors leave a circle (one harmonic) or an oval (two).
+def section_misfit(clock, residual, n_sectors, min_points, min_share, n_harmonics):
+    """Return how far the medians of sectors leave a circle (one harmonic) or an oval (two).
 
-    Sectors of fewer than `least` points or a `least_share` of all do not count. Root mean
-    square over the degrees of freedom; 0 where there are two of them or fewer.
+    Root mean square over the degrees of freedom; 0 where there are two of them or fewer.
+
+    Parameters
+    ----------
+    clock (n,) : clock angles, radians
+    residual (n,) : distances from the surface, metres
+    n_sectors : number of sectors
+    min_points, min_share : sectors of fewer points, or of a smaller fraction, do not count
+    n_harmonics : 1 or 2
     """
     n = clock.shape[0]
     sector = np.empty(n, np.int64)
@@ -96,7 +116,7 @@ def section_misfit(clock, residual, n_sectors, least, least_share, n_harmonics):
     n_used = 0
     for s in range(n_sectors):
         a, b = starts[s], starts[s + 1]
-        if b - a < max(least, least_share * n):
+        if b - a < max(min_points, min_share * n):
             continue
         middle = (b - a) // 2
         values[n_used] = np.partition(residual[members[a:b]], middle)[middle]
@@ -109,7 +129,7 @@ def section_misfit(clock, residual, n_sectors, least, least_share, n_harmonics):
     if n_used <= p + 2:
         return 0.0
     values = values[:n_used]
-    take_off(terms[:n_used], values)
+    remove_explained(terms[:n_used], values)
     total = 0.0
     for value in values:
         total += value * value
@@ -118,9 +138,16 @@ def section_misfit(clock, residual, n_sectors, least, least_share, n_harmonics):
 
 @njit(cache=True, nogil=True)
 def least_distances(terms, values, expected, n_steps):
-    """What terms (n, p) leave of values (n,) where the sum of what they leave is least.
+    """Return the residuals of values from terms with the least sum of absolute values.
 
-    In units of the noise `expected` (n,), by weighted least squares in `n_steps`.
+    By iteratively reweighted least squares.
+
+    Parameters
+    ----------
+    terms (n, p) : design
+    values (n,) : any unit
+    expected (n,) : expected noise, in that unit
+    n_steps : number of iterations
     """
     n, p = terms.shape
     weight, left = 1.0 / expected, values.copy()
@@ -130,7 +157,7 @@ def least_distances(terms, values, expected, n_steps):
             for k in range(p):
                 weighted[i, k] = weight[i] * terms[i, k]
             scaled[i] = weight[i] * values[i]
-        take_off(weighted, scaled)
+        remove_explained(weighted, scaled)
         for i in range(n):
             left[i] = scaled[i] / weight[i]
             # Weights of the least sum of distances, levelled where noise is all there is.

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipecore._kernels.chains import unite_followers
-from pipecore._kernels.components import flatten
+from pipecore._kernels.chain_links import unite_followers
+from pipecore._kernels.disjoint_sets import flatten
+from pipecore._kernels.line_search import AxisEllipses, PieceLimits
 from pipecore.ellipses import Ellipses
 from pipecore.progress import Progress
 
@@ -48,6 +49,8 @@ def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
     reach = np.maximum(REACH * ellipses.width, WIDE_REACH * ellipses.radius)
     least = reach.min()
     roots = np.arange(n, dtype=np.int32)
+    on_axis = AxisEllipses(ellipses.centre, ellipses.axis, ellipses.radius, ellipses.radius_sd)
+    limits = PieceLimits(MAX_TURN_COS, MAX_OFFSET, MAX_RADIUS_CHANGE)
     size_class = np.ceil(np.log2(reach / least) - 1e-9).astype(int)
     for k in np.unique(size_class):
         # The smallest ones join with all that are near, the others among themselves.
@@ -55,10 +58,7 @@ def join_centres(ellipses: Ellipses, progress: Progress) -> NDArray[np.int32]:
         members = members[np.argsort(ellipses.centre[members, 0], kind="stable")]
         for some, pairs in _near(ellipses.centre[members], least * 2.0**k):
             progress.update("axes", 0.5)
-            unite_followers(
-                pairs, members[some], ellipses.centre, ellipses.axis, ellipses.radius,
-                ellipses.radius_sd, MAX_TURN_COS, MAX_RADIUS_CHANGE, MAX_OFFSET, roots,
-            )  # fmt: skip
+            unite_followers(pairs, members[some], on_axis, limits, roots)
     flatten(roots)
     _, label, sizes = np.unique(roots, return_inverse=True, return_counts=True)
     rank = np.empty(len(sizes), np.int32)

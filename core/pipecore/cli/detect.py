@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipecore import io, parallel
-from pipecore._kernels.neighbours import fit_planes
+from pipecore._kernels.local_surfaces import fit_planes
 from pipecore.cli.console import Console
 from pipecore.cli.parser import given_settings
 from pipecore.errors import WriteError

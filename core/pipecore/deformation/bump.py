@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import bumps as kernels
+from pipecore._kernels import bump_fit as kernels
 from pipecore.geometry import Array
 
 MAX_POINTS = 6000
@@ -158,8 +158,8 @@ def fit_bump(
         near = (np.abs(along) < 0.8 * length) & (np.abs(around) < 0.8 * width)
         if np.count_nonzero(near) < 8:
             return None
-        data = _binned_means(along[near], around[near], deviation[near], noise[near] * inflation)
-        plain = _fit(data, first, diameter, contour_sd)
+        points = _binned_means(along[near], around[near], deviation[near], noise[near] * inflation)
+        plain = _fit(points, first, diameter, contour_sd)
         first = plain.parameters
         length, width = np.exp(first[3:5])
         if min(length, width) < MIN_EXTENT * diameter:
@@ -167,10 +167,10 @@ def fit_bump(
         if length > MAX_LENGTH * diameter or width > MAX_WIDTH * diameter:
             return None
     fits = [plain]
-    if abs(first[0]) > FORMS_SIGNIFICANCE * _height_sd((data[0], data[1], data[3]), length, width):
-        fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd))
-        fits.append(_fit(data, first, diameter, contour_sd, CONE))
-        fits.append(_fit(data, np.append(first, 0.0), diameter, contour_sd, FRUSTUM))
+    if abs(first[0]) > FORMS_SIGNIFICANCE * _height_sd(points, length, width):
+        fits.append(_fit(points, np.append(first, 0.0), diameter, contour_sd))
+        fits.append(_fit(points, first, diameter, contour_sd, CONE))
+        fits.append(_fit(points, np.append(first, 0.0), diameter, contour_sd, FRUSTUM))
     best = min(fits, key=lambda fit: fit.aic)
     # That it may be another form is part of the uncertainty of the height.
     likely = np.exp(-0.5 * (np.array([fit.aic for fit in fits]) - best.aic))
@@ -181,7 +181,7 @@ def fit_bump(
     doubt = float(likely @ (heights - height) ** 2)
     along_peak, around_peak = best.parameters[1:3]
     length, width = np.exp(best.parameters[3:5])
-    misfit = _core_misfit(data, best)
+    misfit = _core_misfit(points, best)
     inside = np.hypot(2 * (along - along_peak) / length, 2 * (around - around_peak) / width)
     # Curvatures from the plain cosine: exponents make them zero or infinite at the peak.
     second = 2 * np.pi**2 * abs(plain.parameters[0]) / np.exp(2 * plain.parameters[3:5])
@@ -196,7 +196,11 @@ def fit_bump(
         curvature_around=float(second[1]),
         misfit=misfit,
         noise=_height_sd(
-            (along - along_peak, around - around_peak, noise * inflation), length, width
+            kernels.BumpPoints(
+                along - along_peak, around - around_peak, deviation, noise * inflation
+            ),
+            length,
+            width,
         ),
         n_points=int(np.count_nonzero(inside < 1)),
         volume=float(abs(height) * np.pi / 4 * length * width * best.mean_share),
@@ -225,9 +229,9 @@ CONE = Form(kernels.CONE, cone, 0.4)
 FRUSTUM = Form(kernels.FRUSTUM, frustum, 0.7)
 
 
-def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
+def _core_misfit(points: kernels.BumpPoints, fit: _Fit) -> float:
     """Root mean square of the residuals under the bump, in units of the noise."""
-    along, around, deviation, noise = data
+    along, around, deviation, noise = points
     p = fit.parameters
     rho = np.hypot(2 * (along - p[1]) / np.exp(p[3]), 2 * (around - p[2]) / np.exp(p[4]))
     core = rho < CORE_EXTENT
@@ -238,22 +242,20 @@ def _core_misfit(data: tuple[Array, ...], fit: _Fit) -> float:
     return float(np.sqrt(np.mean(residual**2)))
 
 
-def _height_sd(data: tuple[Array, ...], length: float, width: float) -> float:
+def _height_sd(points: kernels.BumpPoints, length: float, width: float) -> float:
     """Noise of the height of a bump whose place and size are known."""
-    along, around, noise = data
-    b = bump_shape(np.hypot(2 * along / length, 2 * around / width))
-    return float(1.0 / np.sqrt(max(np.sum((b / noise) ** 2), 1e-12)))
+    b = bump_shape(np.hypot(2 * points.along / length, 2 * points.around / width))
+    return float(1.0 / np.sqrt(max(np.sum((b / points.noise) ** 2), 1e-12)))
 
 
 def _fit(
-    data: tuple[Array, ...],
+    points: kernels.BumpPoints,
     first: Array,
     diameter: float,
     contour_sd: float,
     form: Form | None = None,
 ) -> _Fit:
     form = form or BELL
-    along, around, deviation, noise = data
     slack = 0.3 * np.exp(first[3:5])
 
     n_free = len(first)
@@ -269,19 +271,17 @@ def _fit(
     middle[3:5] = np.log(TYPICAL_EXTENT * diameter) / EXTENT_PRIOR
 
     p, normal = np.empty(n_free), np.empty((n_free, n_free))
-    chi2 = kernels.fit(
-        form.number, first, along, around, deviation, noise, slopes, middle,
-        MAX_EVALUATIONS, TOLERANCE, p, normal,
-    )  # fmt: skip
+    prior = kernels.BumpPrior(slopes, middle)
+    chi2 = kernels.fit(form.number, first, points, prior, MAX_EVALUATIONS, TOLERANCE, p, normal)
     return _Fit(p, np.asarray(np.linalg.inv(normal), np.float64), chi2, form)
 
 
 def _binned_means(
     along: Array, around: Array, deviation: Array, noise: Array
-) -> tuple[Array, Array, Array, Array]:
+) -> kernels.BumpPoints:
     """Weighted means over a fine mesh where there are more points than the fit needs."""
     if len(along) <= MAX_POINTS:
-        return along, around, deviation, noise
+        return kernels.BumpPoints(along, around, deviation, noise)
     mesh = 64
 
     def bin_of(x: Array) -> NDArray[np.intp]:
@@ -296,4 +296,6 @@ def _binned_means(
     def mean(x: Array) -> Array:
         return np.asarray(np.bincount(index, weight * x, minlength=mesh * mesh)[some] / total[some])
 
-    return mean(along), mean(around), mean(deviation), 1.0 / np.sqrt(total[some])
+    return kernels.BumpPoints(
+        mean(along), mean(around), mean(deviation), 1.0 / np.sqrt(total[some])
+    )

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import contour as kernels
+from pipecore._kernels import contour_fit as kernels
 from pipecore._kernels.linear import inverse_by_band
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
@@ -36,9 +36,7 @@ END_MARGIN = 0.3
 LEVEL_PRIOR, WALK_PRIOR = 0.1, 0.02
 """How far a coefficient lies from zero, and changes over two diameters: shares of the radius."""
 
-CAUCHY, TUKEY, N_ROUNDS = 2.4, 4.7, 6
-CHANGE = 1e-6
-"""A fit is done where no coefficient changes by more than that any more, metres."""
+LOSS = kernels.RobustLoss(cauchy=2.4, tukey=4.7, n_rounds=6, tolerance=1e-6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +113,8 @@ class Contour:
         """Height of the contour above the fitted surface per cell, metres."""
         result = np.empty(self.grid.shape)
         phi = harmonics(self.grid.clocks, self.n_terms)
-        kernels.heights(self.basis.first, self.basis.values, phi, self.coefficients, result)
+        terms = kernels.ContourTerms(self.basis.first, self.basis.values, phi)
+        kernels.heights(terms, self.coefficients, result)
         return result
 
     @cached_property
@@ -173,12 +172,11 @@ def fit_contour(
     basis = spline_basis(grid, knot_diameters)
     phi = harmonics(grid.clocks, n_terms)
     prior = _prior_band(grid, basis.n_splines, n_terms, knot_diameters, constant_radius)
-    starts, column, y, weight = kernels.list_cells(height, variance, inner_rows(grid), FLOOR)
+    cells = kernels.list_cells(height, variance, inner_rows(grid), FLOOR)
     band, coefficients = np.empty_like(prior), np.empty((basis.n_splines, n_terms))
     kernels.fit_robustly(
-        basis.first, basis.values, phi, starts, column, y, weight, prior,
-        CAUCHY, TUKEY, N_ROUNDS, CHANGE, band, coefficients,
-    )  # fmt: skip
+        kernels.ContourTerms(basis.first, basis.values, phi), cells, prior, LOSS, band, coefficients
+    )
     return Contour(grid, basis, coefficients, band)
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from pipecore._kernels import maps as kernels
+from pipecore._kernels import map_filters as kernels
 from pipecore.geometry import Array
+from pipecore.robust import MAD_TO_SD, robust_sd
 from pipecore.types import Element
 
 Flags = NDArray[np.bool_]
@@ -187,9 +188,9 @@ def local_noise(grid: Grid, cell: Cells, height: Array) -> Array:
     share = np.sqrt(np.maximum(around - 1, 0) / np.maximum(around, 1))
     usable = around.ravel()[cell] >= 4
     if np.count_nonzero(usable) < 10:
-        return np.full(grid.shape, 1.4826 * float(np.median(np.abs(height - np.median(height)))))
+        return np.full(grid.shape, robust_sd(height - np.median(height)))
     residual = np.abs(height - mean.ravel()[cell])[usable] / share.ravel()[cell[usable]]
-    overall = 1.4826 * float(np.median(residual))
+    overall = robust_sd(residual)
     block_rows = max(1, round(1.0 / grid.row_size))
     block_columns = max(1, round(grid.n_columns / 12))
     row, column = np.divmod(cell[usable], grid.n_columns)
@@ -198,7 +199,7 @@ def local_noise(grid: Grid, cell: Cells, height: Array) -> Array:
     n_blocks = (-(-grid.n_rows // block_rows)) * n_across
     medians, counts = group_median(block, residual, n_blocks)
     # A shrunken estimate: forty points' worth of belief in the whole element's noise.
-    local = np.where(counts > 0, 1.4826 * medians, overall)
+    local = np.where(counts > 0, MAD_TO_SD * medians, overall)
     blended = np.sqrt((counts * local**2 + 40 * overall**2) / (counts + 40))
     rows, columns = np.indices(grid.shape)
     return np.asarray(blended[(rows // block_rows) * n_across + columns // block_columns])

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipecore._kernels import maps as kernels
+from pipecore._kernels import map_filters as kernels
 from pipecore.deformation.deviation_map import Flags, Grid
 from pipecore.geometry import Array
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipecore._kernels import series as kernels
+from pipecore._kernels import fourier_series as kernels
 from pipecore.ellipses.nonlinear import NoFit
 from pipecore.geometry import Array
 from pipecore.reasons import Reason
@@ -25,18 +25,19 @@ MAX_GAP = np.deg2rad(18.0)
 """A wider gap between neighbouring points is a hole: half of the shortest wave."""
 
 MIN_ARC = np.deg2rad(60.0)
-POINTS_PER_PARAMETER = 3
 MIN_POINTS = 12
 
-TUKEY, OUTLYING, N_ROUNDS = 4.7, 4.0, 5
-MAX_POINTS, N_CELLS = 1440, 720
-"""More points are taken together in cells of half a degree: no wave is that short."""
-
 STEP = np.deg2rad(2.0)
-LIMITS = (
-    POINTS_PER_PARAMETER, STEP, MIN_ARC, MAX_POINTS, N_CELLS, N_ROUNDS, TUKEY, OUTLYING,
-)  # fmt: skip
-"""As the kernels take them. A lone point between two holes is no arc: it takes a step."""
+LIMITS = kernels.SeriesLimits(
+    points_per_parameter=3,
+    min_span=STEP,  # A lone point between two holes is no arc.
+    min_arc=MIN_ARC,
+    max_points=1440,
+    n_cells=720,  # More points are averaged in cells of half a degree: no wave is that short.
+    n_rounds=5,
+    tukey=4.7,
+    outlying=4.0,
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import axes as axis_kernels
-from pipecore._kernels import unrolled as kernels
+from pipecore._kernels import pipe_coordinates as axis_kernels
+from pipecore._kernels import unrolling as kernels
 from pipecore.geometry import ArcAxis, Array
 from pipecore.types import Element, ElementKind
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipecore._kernels.arcs import best_arc
-from pipecore._kernels.lines import best_line, take_lines
+from pipecore._kernels.arc_search import best_arc
+from pipecore._kernels.line_search import AxisEllipses, PieceLimits, best_line, take_lines
 from pipecore.axes import join_centres
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
 from pipecore.ellipses import Ellipses
@@ -84,6 +84,11 @@ class _Rows:
             self.width[rows],
         )
 
+    @property
+    def on_axis(self) -> AxisEllipses:
+        """As the kernels take them."""
+        return AxisEllipses(self.centre, self.axis, self.radius, self.radius_sd)
+
 
 def propose_surfaces(
     ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
@@ -147,11 +152,10 @@ def _take_lines(
         return [], members
     e = rows[members]
     number = np.empty(len(members), np.int32)
-    lines = take_lines(
-        e.centre, e.axis, e.radius, e.radius_sd, N_TRIALS, is_tapered,
-        (MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER), float(np.median(e.width)),
-        min_length, MIN_ELLIPSES, number,
-    )  # fmt: skip
+    limits = PieceLimits(
+        MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER, min_length, MIN_ELLIPSES
+    )
+    lines = take_lines(e.on_axis, N_TRIALS, is_tapered, limits, float(np.median(e.width)), number)
     pieces = [
         Proposal(
             LineSurface(line[:3].copy(), line[3:6].copy(), line[6], line[7], is_tapered),
@@ -172,19 +176,15 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
     arc = np.empty(8)
     pieces: list[Proposal] = []
     while free.sum() >= MIN_ELLIPSES:
-        count = best_arc(
-            e.centre, e.axis, e.radius, e.radius_sd, free, N_TRIALS,
-            MIN_COS, 1.5 * MAX_OFFSET, 1.5 * MAX_CHANGE, inliers, arc,
-        )  # fmt: skip
+        limits = PieceLimits(MIN_COS, 1.5 * MAX_OFFSET, 1.5 * MAX_CHANGE)
+        count = best_arc(e.on_axis, free, N_TRIALS, limits, inliers, arc)
         if count < MIN_ELLIPSES:
             break
         chosen = np.flatnonzero(inliers)
         free[chosen] = False
         straight = np.empty(len(members), np.bool_)
-        n_straight = best_line(
-            e.centre, e.axis, e.radius, e.radius_sd, inliers, N_TRIALS, False,
-            MIN_COS, MAX_OFFSET, MAX_CHANGE, straight,
-        )  # fmt: skip
+        limits = PieceLimits(MIN_COS, MAX_OFFSET, MAX_CHANGE)
+        n_straight = best_line(e.on_axis, inliers, N_TRIALS, False, limits, straight)
         if n_straight > MOSTLY_STRAIGHT * count:
             continue
         model = ArcSurface(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import ellipses as kernels
+from pipecore._kernels.curve_fits import CurveFits, CurveLimits, fit_curves
 from pipecore.ellipses.direct import PlaneEllipses, fit_direct_ellipses
 from pipecore.ellipses.free import fit_free_ellipses
 from pipecore.ellipses.uncertainty import radius_sd_factor
@@ -117,15 +117,15 @@ def fit_ellipses(
     within bounds, its normals point to its centre, and Akaike's criterion prefers it to
     a line. `check` is called now and then; it may raise to cancel.
     """
-    fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
+    fits = CurveFits.empty(len(curves))
     tolerance = surface.tolerance
-    kernels.fit_curves(
-        curves.uv, curves.normals, curves.starts, 0, len(curves),
-        tolerance, 4.0 * surface.voxel, 1.0 - settings.max_flattening, MAX_OFF_AXIS, fits,
-    )  # fmt: skip
-    radius, rms, arc = fits[:, 5], fits[:, 6], fits[:, 7]
+    limits = CurveLimits(
+        tolerance, 4.0 * surface.voxel, 1.0 - settings.max_flattening, MAX_OFF_AXIS
+    )
+    fit_curves(curves.uv, curves.normals, curves.starts, 0, len(curves), limits, fits)
+    radius, rms, arc = fits.radius, fits.rms, fits.arc
     max_rms = settings.max_rms_mm / 1e3 or 1.25 * tolerance
-    radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits[:, 8])
+    radius_sd = rms * radius_sd_factor(arc) / np.sqrt(fits.n_points)
     with np.errstate(invalid="ignore"):
         is_sure = (arc >= SURE_ARC) | (radius_sd < MAX_RADIUS_SD * radius)
         accepted = (
@@ -135,15 +135,15 @@ def fit_ellipses(
             & (rms <= 0.12 * radius)
             & (radius >= 0.8 * sizes.min_radius_mm / 1e3)
             & (radius <= 1.2 * sizes.max_radius_mm / 1e3)
-            & (fits[:, 9] >= MIN_RADIAL)
+            & (fits.radial_share >= MIN_RADIAL)
         )
     kept = np.flatnonzero(accepted)
-    fits = fits[kept]
-    is_long = fits[:, 7] >= FREE_FIT_ARC
+    fits = fits.rows(kept)
+    is_long = fits.arc >= FREE_FIT_ARC
     line_rss, free = _competing_fits(curves, kept, is_long, settings.fit, check)
     n_points = np.diff(curves.starts)[kept]
     aic_line = akaike(LINE_PARAMETERS, n_points, line_rss)
-    circle_rss = fits[:, 6] ** 2 * n_points
+    circle_rss = fits.rms**2 * n_points
     is_free = is_long & np.isfinite(free.semi_minor)
     aic_ellipse = np.where(
         is_free,
@@ -199,18 +199,18 @@ def _combined(components: Array, vectors: Array) -> Array:
 def _to_space(
     curves: Curves,
     kept: NDArray[np.intp],
-    fits: Array,
+    fits: CurveFits,
     free: PlaneEllipses,
     is_free: NDArray[np.bool_],
     aic_line: Array,
     aic_ellipse: Array,
 ) -> Ellipses:
     frame = curves.frame
-    centre = _combined(fits[:, :2], frame) + curves.mid_plane(kept)[:, None] * frame[2]
-    axis = _combined(fits[:, 2:5], frame)
-    radius, arc, n_points = fits[:, 5], fits[:, 7], fits[:, 8].astype(np.int32)
+    centre = _combined(fits.centre, frame) + curves.mid_plane(kept)[:, None] * frame[2]
+    axis = _combined(fits.axis, frame)
+    n_points = fits.n_points.astype(np.int32)
     # The major axis of the constrained ellipse runs along the axis's tilt.
-    angle = np.where(is_free, free.angle, np.arctan2(fits[:, 3], fits[:, 2]))
+    angle = np.where(is_free, free.angle, np.arctan2(fits.axis[:, 1], fits.axis[:, 0]))
     return Ellipses(
         stack_id=np.full(len(kept), curves.stack.stack_id, np.int32),
         profile_index=curves.profile_index[kept],
@@ -218,15 +218,16 @@ def _to_space(
         centre=centre,
         normal=np.broadcast_to(frame[2], centre.shape),
         axis=axis,
-        radius=radius,
-        radius_sd=fits[:, 6] * radius_sd_factor(arc) / np.sqrt(n_points),
-        meeting_point=_combined(fits[:, 10:13], frame) + curves.mid_plane(kept)[:, None] * frame[2],
-        meeting_distance=fits[:, 13],
-        arc=arc,
+        radius=fits.radius,
+        radius_sd=fits.rms * radius_sd_factor(fits.arc) / np.sqrt(n_points),
+        meeting_point=_combined(fits.meeting_point, frame)
+        + curves.mid_plane(kept)[:, None] * frame[2],
+        meeting_distance=fits.meeting_distance,
+        arc=fits.arc,
         n_points=n_points,
-        rms=fits[:, 6],
-        semi_minor=np.where(is_free, free.semi_minor, radius),
-        semi_major=np.where(is_free, free.semi_major, radius / fits[:, 4]),
+        rms=fits.rms,
+        semi_minor=np.where(is_free, free.semi_minor, fits.radius),
+        semi_major=np.where(is_free, free.semi_major, fits.radius / fits.axis[:, 2]),
         major_direction=np.cos(angle)[:, None] * frame[0] + np.sin(angle)[:, None] * frame[1],
         aic_line=aic_line,
         aic_ellipse=aic_ellipse,

@@ -20,6 +20,7 @@ from pipecore.ellipses.distances import (
     to_parameters,
 )
 from pipecore.reasons import Reason
+from pipecore.robust import MAD_TO_SD, TUKEY_REACH, tukey_weights
 
 Array = NDArray[np.float64]
 Model = Callable[[Array, Array], tuple[Array, Array]]
@@ -28,8 +29,6 @@ SAMPLE_SIZE, N_SAMPLES = 6, 300
 """Random samples of the robust fit: with 40 % outliers, 14 of 300 are clean on average."""
 N_TEST_POINTS = 500
 """About as many points rate the samples."""
-TUKEY_REACH = 4.685
-"""In standard deviations: 95 % as efficient as least squares where there are no outliers."""
 MAX_CONDITION = 1e8
 MAX_FLATTENING = 0.999
 MAX_REACH = 100.0
@@ -301,7 +300,7 @@ def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
     distances = model(points, parameters)[0]
     sigma = _spread(distances)
     for _ in range(30):
-        weights = _tukey(distances / (TUKEY_REACH * sigma))
+        weights = tukey_weights(distances / (TUKEY_REACH * sigma))
         if (weights > 0).sum() <= N_PARAMETERS:
             return None
         found, _ = _descend(model, points, parameters, weights, max_evaluations=100)
@@ -315,7 +314,7 @@ def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
         if moved < 1e-7:
             break
     q = distances / (TUKEY_REACH * sigma)
-    weights = _tukey(q)
+    weights = tukey_weights(q)
     near = weights > 0
     n_near = int(near.sum())
     slope = float(((1 - q**2) * (1 - 5 * q**2))[near].mean()) if n_near > N_PARAMETERS else 0.0
@@ -330,8 +329,4 @@ def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
 def _spread(distances: Array) -> float:
     """Standard deviation from the median distance, for few points too; never zero."""
     correction = 1 + 5 / (len(distances) - N_PARAMETERS)
-    return max(1.4826 * correction * float(np.median(np.abs(distances))), 1e-10)
-
-
-def _tukey(q: Array) -> Array:
-    return np.where(np.abs(q) < 1, (1 - q**2) ** 2, 0.0)
+    return max(MAD_TO_SD * correction * float(np.median(np.abs(distances))), 1e-10)

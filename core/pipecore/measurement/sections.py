@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipecore._kernels.grouping import group_from
-from pipecore._kernels.sections import fit_sections
+from pipecore._kernels.section_circles import fit_sections
 from pipecore.ellipses import (
     CIRCLE_PARAMETERS,
     ELLIPSE_PARAMETERS,

@@ -7,8 +7,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import ellipses as ellipse_kernels
-from pipecore._kernels import profiles as kernels
+from pipecore._kernels import profile_cuts as kernels
+from pipecore._kernels.curve_splitting import SplitLimits, split_curves
 from pipecore._kernels.grouping import group_from, group_large
 from pipecore.geometry import unit
 from pipecore.parallel import for_chunks, for_items
@@ -89,6 +89,11 @@ def stack_frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rows e1, e2, d: a right-handed frame with d along `direction`."""
     e1 = unit(np.cross(np.eye(3)[np.argmin(np.abs(direction))], direction))
     return np.stack([e1, np.cross(direction, e1), direction])
+
+
+def stack_cut(stack: Stack, frame: NDArray[np.float64]) -> kernels.StackCut:
+    """Return how a stack cuts, as the kernels take it; `frame` is its `stack_frame`."""
+    return kernels.StackCut(frame[2], frame[0], frame[1], stack.width, stack.offset)
 
 
 def segment_profiles(
@@ -180,11 +185,13 @@ class _Cutter:
         span: tuple[float, float],
     ) -> None:
         self.frame = stack_frame(stack.direction)
+        self._cut = stack_cut(stack, self.frame)
         self._surface, self._stack, self._max_radius = surface, stack, max_radius
         self._gap = settings.gap_mm / 1e3 or GAP * surface.voxel
         self._is_gap_fixed = bool(settings.gap_mm)
         self._is_fitted = settings.method is ProfileMethod.CURVE_FITTING
-        self._cos_corner = np.cos(np.deg2rad(settings.corner_deg)) if self._is_fitted else -1.0
+        cos_corner = np.cos(np.deg2rad(settings.corner_deg)) if self._is_fitted else -1.0
+        self._smoothness = kernels.Smoothness(cos_corner, surface.tolerance, 0.12)
         n = len(surface.xyz)
         profile: NDArray[np.integer] = np.empty(n, np.int32)
         limits = np.empty((-(-n // POINTS_AT_A_TIME), 2), np.int64)
@@ -192,7 +199,7 @@ class _Cutter:
         def find(start: int, stop: int) -> None:
             limits[start // POINTS_AT_A_TIME] = kernels.find_profiles(
                 surface.xyz, surface.normals, surface.spacing, start, stop,
-                self.frame[2], stack.width, stack.offset, MAX_SLOPE, stack.min_spacing, profile,
+                self._cut, MAX_SLOPE, stack.min_spacing, profile,
             )  # fmt: skip
 
         for_chunks(find, n, POINTS_AT_A_TIME, "profiles", progress, span)
@@ -217,9 +224,8 @@ class _Cutter:
         n = len(points)
         profile, uv, normals = np.empty(n, np.int32), np.empty((n, 2)), np.empty((n, 3))
         kernels.carry_to_mid_planes(
-            surface.xyz, surface.normals, points, self.frame[2], self.frame[0], self.frame[1],
-            self._stack.width, self._stack.offset, profile, uv, normals,
-        )  # fmt: skip
+            surface.xyz, surface.normals, points, self._cut, profile, uv, normals
+        )
         order, keys, n_v = kernels.sort_by_cell(profile, uv, self._gap, MARGIN)
         points, profile, uv, normals = points[order], profile[order], uv[order], normals[order]
         reach = np.full(n, self._gap)
@@ -228,18 +234,23 @@ class _Cutter:
             reach = np.clip(GAP_IN_SPACINGS * spacing, self._gap, MAX_GAPS * self._gap)
         parents = np.arange(n)
         kernels.join_neighbours(
-            keys, n_v, self._gap, uv, normals, reach, self._cos_corner, surface.tolerance, 0.12,
-            0, n, parents,
-        )  # fmt: skip
+            keys, n_v, self._gap, uv, normals, reach, self._smoothness, 0, n, parents
+        )
         curves = self._grouped(points, uv, normals, profile, parents, n)
         if not self._is_fitted or len(curves) == 0:
             return curves
         piece = np.zeros(len(curves.points), np.int64)
-        ellipse_kernels.split_curves(
-            curves.uv, curves.normals, curves.starts, 0, len(curves), MIN_CURVE,
-            surface.tolerance, 4.0 * surface.voxel, 0.9, np.cos(np.pi / 4), self._max_radius, 60,
-            MAX_PIECES, piece,
-        )  # fmt: skip
+        limits = SplitLimits(
+            min_points=MIN_CURVE,
+            tolerance=surface.tolerance,
+            max_gap=4.0 * surface.voxel,
+            cos_radial=0.9,
+            min_cos_tilt=np.cos(np.pi / 4),
+            max_radius=self._max_radius,
+            n_trials=60,
+            max_pieces=MAX_PIECES,
+        )
+        split_curves(curves.uv, curves.normals, curves.starts, 0, len(curves), limits, piece)
         profile = np.repeat(curves.profile_index, np.diff(curves.starts))
         label = curves.curve_of_point * (MAX_PIECES + 1) + piece
         n_labels = len(curves) * (MAX_PIECES + 1)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import components
+from pipecore._kernels import disjoint_sets
 from pipecore.allocation import BLOCK, Allocate, in_memory
 from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.types import NO_ID
@@ -35,7 +35,7 @@ class StackOverlay:
 
     def add(self, points: NDArray[np.int32], starts: NDArray[np.int64]) -> None:
         """Join the points that share a curve: rows starts[c] … starts[c + 1] of `points`."""
-        components.unite_groups(points, starts, self._parents)
+        disjoint_sets.unite_groups(points, starts, self._parents)
 
     def add_planes(self, start: int, plane: NDArray[np.int32]) -> None:
         """Join the points of each plane: `plane` has the numbers of those from `start` on.
@@ -46,17 +46,17 @@ class StackOverlay:
         if n_more > 0:
             unknown = np.full(n_more, -1, np.int64)
             self._first_of_plane = np.concatenate([self._first_of_plane, unknown])
-        components.unite_labelled(plane, start, self._first_of_plane, self._parents)
+        disjoint_sets.unite_labelled(plane, start, self._first_of_plane, self._parents)
 
     def number_segments(self, progress: Progress = NoProgress()) -> NDArray[np.int32]:
         """Return the segment of each point, 1 for the largest; `NO_ID` for points of none."""
         n = len(self._parents)
         progress.update("segments", 0.0)
-        components.flatten(self._parents)
+        disjoint_sets.flatten(self._parents)
         sizes = self._allocate("sizes", (n,), np.int32)
         roots = [np.empty(0, np.intp)]
         for start, stop in in_chunks(n, BLOCK, "segments", progress):
-            components.count_members(self._parents[start:stop], sizes)
+            disjoint_sets.count_members(self._parents[start:stop], sizes)
         for start, stop in in_chunks(n, BLOCK, "segments", progress):
             roots.append(start + np.flatnonzero(sizes[start:stop] >= MIN_SEGMENT))
         by_size = np.concatenate(roots)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import neighbours
+from pipecore._kernels import local_surfaces
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
@@ -60,10 +60,9 @@ def axes_at(
     axes, spreads = np.empty((len(sample), 3)), np.empty((len(sample), 3))
 
     def work(start: int, stop: int) -> None:
-        neighbours.fit_local_axes(
-            points, normals, grid.order, *lookup, radius, sample, cells, start, stop,
-            axes, spreads,
-        )  # fmt: skip
+        local_surfaces.fit_local_axes(
+            points, normals, lookup, radius, sample, cells, start, stop, axes, spreads
+        )
 
     for_chunks(work, len(sample), 2_000, "directions", progress, (0.0, 0.8))
     with np.errstate(invalid="ignore"):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import neighbours
+from pipecore._kernels import local_surfaces
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
@@ -116,8 +116,8 @@ def fit_planes(
     normals, residuals, spacing = np.empty((n, 3)), np.empty(n), np.empty(n)
 
     def work(start: int, stop: int) -> None:
-        neighbours.fit_planes(
-            xyz, *grid.rows, radius, MIN_NEIGHBOURS, start, stop, grid.order,
+        local_surfaces.fit_planes(
+            xyz, grid.rows, radius, MIN_NEIGHBOURS, start, stop, grid.order,
             normals, residuals, spacing,
         )  # fmt: skip
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import sorting
+from pipecore._kernels import cell_sorting
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
@@ -66,7 +66,7 @@ def average_voxels(
     means = np.empty((len(starts) - 1, 3))
 
     def average(first: int, last: int) -> None:
-        sorting.mean_points(xyz, order, starts, first, last, means)
+        cell_sorting.mean_points(xyz, order, starts, first, last, means)
 
     for_chunks(average, len(means), CHUNK, "thinning", progress, (0.8, 1.0))
     return DownsampledCloud(means, (order, starts), edge)

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import sorting, voxels
+from pipecore._kernels import cell_sorting, voxel_hash
+from pipecore._kernels.voxel_hash import HashTable, VoxelFrame
 from pipecore.errors import PipecoreError
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress
 
 Array = NDArray[np.float64]
-Table = tuple[NDArray[np.int64], NDArray[np.int32]]
 
 CHUNK = 1_000_000
 
@@ -66,9 +66,9 @@ class GridFrame:
         return cls.around(low, high, edge)
 
     @property
-    def numbers(self) -> tuple[NDArray[np.int64], float, int, int]:
-        """What the kernels need to number a cell."""
-        return self.first, self.edge, self.n_y, self.n_z
+    def numbers(self) -> VoxelFrame:
+        """The frame as the kernels take it."""
+        return VoxelFrame(self.first, self.edge, self.n_y, self.n_z)
 
     def keys(self, xyz: NDArray[np.floating]) -> NDArray[np.int64]:
         """Return the number of the cell of each point (n, 3)."""
@@ -91,7 +91,7 @@ def bounds(xyz: NDArray[np.floating]) -> tuple[Array, Array]:
     corners = np.empty((-(-len(xyz) // CHUNK), 2, 3))
 
     def find(start: int, stop: int) -> None:
-        sorting.find_bounds(xyz, start, stop, corners[start // CHUNK])
+        cell_sorting.find_bounds(xyz, start, stop, corners[start // CHUNK])
 
     if len(corners) == 1:
         find(0, len(xyz))
@@ -100,16 +100,16 @@ def bounds(xyz: NDArray[np.floating]) -> tuple[Array, Array]:
     return corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
 
 
-def empty_table(n_keys: int) -> Table:
+def empty_table(n_keys: int) -> HashTable:
     """Return an empty hash table for up to `n_keys` keys: keys and ids."""
     size = 1 << max(4, int(np.ceil(np.log2(max(n_keys, 1) * 2))))
-    return np.full(size, voxels.EMPTY), np.empty(size, np.int32)
+    return HashTable(np.full(size, voxel_hash.EMPTY), np.empty(size, np.int32))
 
 
-def table_of(keys: NDArray[np.int64]) -> Table:
+def table_of(keys: NDArray[np.int64]) -> HashTable:
     """Return a hash table from distinct keys to their positions."""
     table = empty_table(len(keys))
-    voxels.fill_table(keys, *table)
+    voxel_hash.fill_table(keys, table)
     return table
 
 
@@ -130,10 +130,9 @@ class VoxelCounter:
     def add(self, xyz: NDArray[np.floating], start: int, stop: int, ids: NDArray[np.int32]) -> None:
         """Write the cells of points start … stop."""
         while True:
-            start, self.n_cells = voxels.number_voxels(
-                xyz, start, stop, *self._frame.numbers,
-                *self._table, self.n_cells, self._keys, ids,
-            )  # fmt: skip
+            start, self.n_cells = voxel_hash.number_voxels(
+                xyz, start, stop, self._frame.numbers, self._table, self.n_cells, self._keys, ids
+            )
             if start == stop:
                 return
             self._grow()
@@ -141,5 +140,5 @@ class VoxelCounter:
     def _grow(self) -> None:
         known = self.keys.copy()
         self._table = empty_table(2 * len(self._keys))
-        voxels.fill_table(known, *self._table)
+        voxel_hash.fill_table(known, self._table)
         self._keys = np.resize(known, 2 * len(self._keys))

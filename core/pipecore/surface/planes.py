@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import planes as kernels
+from pipecore._kernels import plane_patches as kernels
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface.grid import GridFrame, VoxelCounter
@@ -47,7 +47,7 @@ class CellSums:
     ----------
     cells : ndarray of int64, shape (c, 3)
     sums : ndarray of int64, shape (c, 10)
-        As the kernels in `pipecore._kernels.planes` need them.
+        As the kernels in `pipecore._kernels.plane_patches` need them.
     """
 
     cells: NDArray[np.int64]

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import sorting as kernels
+from pipecore._kernels import cell_sorting as kernels
+from pipecore._kernels.local_surfaces import FoundCells, SortedCells
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
-from pipecore.surface.grid import GridFrame, Table, table_of
+from pipecore.surface.grid import GridFrame, table_of
 
 Order = tuple[NDArray[np.integer], NDArray[np.integer]]
 """Positions of points in the order of what they belong to, and where those of each begin."""
@@ -52,7 +53,7 @@ def sort_into_cells(
     def sort(first: int, last: int) -> None:
         for k in range(first, last):
             own = slice(bounds[k], bounds[k + 1])
-            kernels.sort_bucket(xyz, *frame.numbers, order[own], is_first[own])
+            kernels.sort_bucket(xyz, frame.numbers, order[own], is_first[own])
 
     for_chunks(sort, len(bounds) - 1, 8, stage, progress, (middle, end))
     return order, np.append(np.flatnonzero(is_first), n).astype(order.dtype)
@@ -76,7 +77,7 @@ def _put_in_buckets(
     counts = np.zeros((-(-n // CHUNK), (last_cell >> shift) + 1), np.int32)
 
     def count(start: int, stop: int) -> None:
-        kernels.count_bins(xyz, start, stop, *frame.numbers, shift, counts[start // CHUNK])
+        kernels.count_bins(xyz, start, stop, frame.numbers, shift, counts[start // CHUNK])
 
     for_chunks(count, n, CHUNK, stage, progress, (begin, middle))
     in_bin = counts.sum(axis=0, dtype=np.int64)
@@ -91,7 +92,7 @@ def _put_in_buckets(
 
     def put(start: int, stop: int) -> None:
         kernels.put_in_buckets(
-            xyz, start, stop, *frame.numbers, shift, bucket_of_bin, places[start // CHUNK], order
+            xyz, start, stop, frame.numbers, shift, bucket_of_bin, places[start // CHUNK], order
         )
 
     for_chunks(put, n, CHUNK, stage, progress, (middle, end))
@@ -137,17 +138,14 @@ class CellGrid:
         return cls(edge, order, keys, starts, frame.n_y, frame.n_z)
 
     @property
-    def rows(self) -> tuple[NDArray[np.int64], NDArray[np.integer], int, int]:
-        """What kernels need that go through all cells in their order."""
-        return self.cell_keys, self.cell_starts, self.n_y, self.n_z
+    def rows(self) -> SortedCells:
+        """The cells as kernels take them that go through all of them in order."""
+        return SortedCells(self.cell_keys, self.cell_starts, self.n_y, self.n_z)
 
     @property
-    def lookup(
-        self,
-    ) -> tuple[NDArray[np.int64], NDArray[np.integer], *Table, int, int]:
-        """What the kernels in `pipecore._kernels.neighbours` need to find neighbours.
+    def lookup(self) -> FoundCells:
+        """The cells as kernels take them that look them up.
 
-        Makes a hash table from the cells' numbers to their places: to be asked for once.
+        Makes a hash table, so it is to be asked for once.
         """
-        table = table_of(self.cell_keys)
-        return self.cell_keys, self.cell_starts, *table, self.n_y, self.n_z
+        return FoundCells(self.order, self.rows, table_of(self.cell_keys))

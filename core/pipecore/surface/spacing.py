@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from pipecore._kernels import spacing as kernels
+from pipecore._kernels import nearest_neighbours as kernels
 from pipecore._kernels.grouping import group_by_label
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
@@ -111,7 +111,7 @@ def _within_cells(
 
     def collect(start: int, stop: int) -> None:
         found, cells = np.empty(stop - start, np.int64), np.empty(stop - start, np.int32)
-        n = kernels.collect_marked(xyz, start, stop, *frame.numbers, *table, found, cells)
+        n = kernels.collect_marked(xyz, start, stop, frame.numbers, table, found, cells)
         collected[start] = found[:n].copy(), cells[:n].copy()
 
     for_chunks(collect, len(xyz), CHUNK, "thinning", progress, (0.05, 0.1))
@@ -122,6 +122,6 @@ def _within_cells(
     # The points are copied: what lies together is read together.
     near = np.asarray(xyz[points[order]], np.float64)
     kernels.nearest_in_cells(
-        near, sample, *frame.numbers, *table, np.arange(len(near)), starts, k, reach
+        near, sample, frame.numbers, table, np.arange(len(near)), starts, k, reach
     )
     return reach

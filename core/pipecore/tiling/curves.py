@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import profiles as kernels
+from pipecore._kernels import profile_cuts as kernels
 from pipecore._kernels.grouping import argsort_keys
 from pipecore.ellipses import Ellipses
-from pipecore.profiles import MAX_SLOPE
+from pipecore.profiles import MAX_SLOPE, stack_cut, stack_frame
 from pipecore.progress import Progress
 from pipecore.settings import Settings
 from pipecore.stacks.directions import REACH, axes_at, sample_positions
@@ -164,7 +164,7 @@ def sort_slab(
     xyz, normals, spacing = (store.open(f"cut-{name}-{number}") for name in CUT_ARRAYS)
     profile = np.empty(len(xyz), np.int32)
     kernels.find_profiles(
-        xyz, normals, spacing, 0, len(profile), stack.direction, stack.width, stack.offset,
+        xyz, normals, spacing, 0, len(profile), stack_cut(stack, stack_frame(stack.direction)),
         MAX_SLOPE, stack.min_spacing, profile,
     )  # fmt: skip
     joins = np.flatnonzero(profile != kernels.NOT_CUT)

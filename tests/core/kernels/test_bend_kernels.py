@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipecore._kernels import bends
+from pipecore._kernels import bend_support
 from pipecore.elements.fittings.bends import Corner, pipe_residuals
 from pipecore.elements.fittings.open_ends import ViewFromEnd
 from pipecore.elements.refinement.surface_fits import LineSurface
@@ -31,7 +31,7 @@ def test_that_points_agree_with_a_pipe_if_they_do_by_its_residuals(rng):
     normals[:900] = outward
     normals[5] = np.nan
     counts = np.empty((3, 2), np.int64)
-    bends.agreement(
+    bend_support.agreement(
         xyz, normals, np.stack([corner.surface(b, 0.1).numbers() for b in map(float, tried)]),
         np.stack([LineSurface(corner.place, t, 0.1).numbers() for t in corner.towards]),
         tried * corner.half_tangent, TOLERANCE, MIN_COS, counts,

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from pipecore._kernels.chains import unite_followers
-from pipecore._kernels.components import flatten
+from pipecore._kernels.chain_links import unite_followers
+from pipecore._kernels.disjoint_sets import flatten
+from pipecore._kernels.line_search import AxisEllipses, PieceLimits
 from tests.core.shapes import random_direction
 
 pytestmark = pytest.mark.kernels
@@ -37,8 +38,9 @@ def test_that_those_are_united_that_follow_each_other(rng):
         pair = rng.choice(n, (1, 2), replace=False)
         roots = np.arange(n, dtype=np.int32)
         unite_followers(
-            pair, members, centre, axis, radius, sd, COS_TURN, RADIUS_CHANGE, MAX_OFFSET, roots
-        )
+            pair, members, AxisEllipses(centre, axis, radius, sd),
+            PieceLimits(COS_TURN, MAX_OFFSET, RADIUS_CHANGE), roots,
+        )  # fmt: skip
         flatten(roots)
         i, j = np.sort(members[pair[0]])
         expected = plainly_follow(*((centre[k], axis[k], radius[k], sd[k]) for k in (i, j)))

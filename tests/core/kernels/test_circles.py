@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from pipecore._kernels.circles import geometric_circle, taubin_circle, tukey_weight
-from pipecore._kernels.sections import fit_sections
+from pipecore._kernels.section_circles import fit_sections
 
 pytestmark = pytest.mark.kernels
 

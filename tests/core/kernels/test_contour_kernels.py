@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import BSpline
 
-from pipecore._kernels import contour as kernels
+from pipecore._kernels import contour_fit as kernels
 
 pytestmark = pytest.mark.kernels
 
@@ -22,7 +22,12 @@ def parts(request, rng):
     height = rng.normal(size=(ROWS, COLUMNS))
     variance = rng.uniform(0.5, 2, (ROWS, COLUMNS))
     variance[rng.random((ROWS, COLUMNS)) < 0.3] = np.inf
-    return table.toarray(), (first, table.data.reshape(-1, 4), phi), height, variance
+    return (
+        table.toarray(),
+        kernels.ContourTerms(first, table.data.reshape(-1, 4), phi),
+        height,
+        variance,
+    )
 
 
 def listed(height, variance):
@@ -50,7 +55,8 @@ def test_that_the_normal_equations_are_those_of_the_whole_design(parts):
     weight = 1 / variance
     expected = design.T @ (weight.ravel()[:, None] * design)
     band, right = np.zeros((size, 4 * phi.shape[1])), np.empty(size)
-    kernels.normal_equations(*splines, *listed(height, variance), band, right)
+    cells = listed(height, variance)
+    kernels.normal_equations(splines, cells, cells.weight, band, right)
     for i in range(band.shape[1]):
         assert_allclose(band[: size - i, i], np.diagonal(expected, -i), atol=1e-12)
         assert_allclose(band[size - i :, i], 0.0)
@@ -63,18 +69,18 @@ def test_that_heights_and_residuals_are_those_of_the_coefficients(parts, rng):
     coefficients = rng.normal(size=(table.shape[1], splines[2].shape[1]))
     expected = table @ coefficients @ splines[2].T
     found = np.empty(height.shape)
-    kernels.heights(*splines, coefficients, found)
+    kernels.heights(splines, coefficients, found)
     assert_allclose(found, expected, atol=1e-12)
     some = np.isfinite(variance)
     scaled = (height - expected)[some] / np.sqrt(variance[some])
     for share in (1.0, 1e-3):  # of wide and of narrow residuals
         cells = listed(expected + share * (height - expected), variance)
         residuals = np.empty(len(scaled))
-        spread = kernels.scaled_residuals(*splines, coefficients, *cells, residuals)
+        spread = kernels.scaled_residuals(splines, coefficients, cells, residuals)
         assert_allclose(residuals, share * scaled, atol=1e-9)
         assert spread == pytest.approx(max(1.4826 * np.median(np.abs(share * scaled)), 1.0))
     none = listed(height, np.full_like(variance, np.inf))
-    assert kernels.scaled_residuals(*splines, coefficients, *none, np.empty(0)) == 1.0
+    assert kernels.scaled_residuals(splines, coefficients, none, np.empty(0)) == 1.0
 
 
 def test_that_the_robust_fit_is_that_of_its_weights(parts, rng):
@@ -100,7 +106,12 @@ def test_that_the_robust_fit_is_that_of_its_weights(parts, rng):
     for tolerance, apart in ((-1.0, 1e-8), (1e-2, 0.2)):
         band, coefficients = np.empty_like(prior), np.empty((table.shape[1], phi.shape[1]))
         n_solved = kernels.fit_robustly(
-            *splines, *listed(height, variance), prior, 2.4, 4.7, 6, tolerance, band, coefficients
+            splines,
+            listed(height, variance),
+            prior,
+            kernels.RobustLoss(2.4, 4.7, 6, tolerance),
+            band,
+            coefficients,
         )
         assert_allclose(coefficients.ravel(), expected, atol=apart)
         assert n_solved == 13 if tolerance < 0 else n_solved <= 13

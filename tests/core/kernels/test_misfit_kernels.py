@@ -16,7 +16,7 @@ def left_by(terms, values):
 def test_that_least_squares_leave_what_they_do(rng):
     terms, values = rng.normal(size=(30, 5)), rng.normal(size=30)
     left = values.copy()
-    misfit.take_off(terms.copy(), left)
+    misfit.remove_explained(terms.copy(), left)
     assert_allclose(left, left_by(terms, values), atol=1e-12)
 
 
@@ -26,7 +26,7 @@ def test_that_a_term_that_others_hold_adds_nothing(rng):
         [terms[:, :3], terms[:, 0] - 2 * terms[:, 2], terms[:, 3], 0 * values]
     )
     left = values.copy()
-    misfit.take_off(doubled.copy(), left)
+    misfit.remove_explained(doubled.copy(), left)
     assert_allclose(left, left_by(terms, values), atol=1e-12)
 
 
@@ -74,10 +74,10 @@ def test_that_a_sphere_is_held_against_the_medians_of_its_patches(rng):
     seen = np.flatnonzero((np.arctan2(out[:, 1], out[:, 0]) > -np.pi / 2) & (out[:, 2] > -0.5))
     departure = np.where(out[:, 2] > 0.0, 0.004, -0.002) + rng.normal(0, 1e-4, n)
     xyz = centre + (radius + departure)[:, None] * out
-    found, low, high, arc = misfit.look_at_sphere(xyz, seen, centre, radius, 36, 12, 8, 5)
+    found, low, high, arc = misfit.sphere_misfit(xyz, seen, centre, radius, 36, 12, 8, 5)
     # Of eight even steps of height four are above the middle and two below.
     assert found == pytest.approx(np.sqrt((4 * 0.004**2 + 2 * 0.002**2) / 6), rel=0.02)
     assert low == pytest.approx((xyz[seen, 2] - centre[2]).min())
     assert high == pytest.approx((xyz[seen, 2] - centre[2]).max())
     assert arc == pytest.approx(1.5 * np.pi, abs=0.2)
-    assert misfit.look_at_sphere(xyz, seen[:3], centre, radius, 36, 12, 8, 5)[0] == np.inf
+    assert misfit.sphere_misfit(xyz, seen[:3], centre, radius, 36, 12, 8, 5)[0] == np.inf

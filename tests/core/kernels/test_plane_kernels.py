@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse.csgraph import connected_components
 
-from pipecore._kernels import planes
+from pipecore._kernels import plane_patches
 from pipecore.surface.grid import GridFrame
 from tests.core.shapes import unit_rows
 
@@ -33,11 +33,11 @@ def grid(rng):
     keys, ids = np.unique(frame.keys(xyz), return_inverse=True)
     cells = frame.cells_of_keys(keys)
     assert_array_equal(frame.keys_of_cells(cells), keys)
-    sums = np.zeros((len(keys), planes.N_SUMS), np.int64)
-    planes.add_to_cells(xyz, normals, ids, EDGE, sums)
+    sums = np.zeros((len(keys), plane_patches.N_SUMS), np.int64)
+    plane_patches.add_to_cells(xyz, normals, ids, EDGE, sums)
     is_flat = np.empty(len(keys), bool)
     mean_normals, means = np.empty((2, len(keys), 3))
-    planes.describe_cells(
+    plane_patches.describe_cells(
         keys, cells, sums, frame.n_y, frame.n_z, 8, 0.03, 0.015, is_flat, mean_normals, means
     )
     size = frame.n_y, frame.n_z
@@ -71,7 +71,7 @@ def test_that_places_are_flat_as_the_eigenvalues_of_their_normals_say(grid):
 def test_that_patches_are_the_components_of_flat_cells_that_go_on(grid, block):
     _, _, _, keys, cells, _, size, is_flat, normals, means = grid
     roots = np.arange(len(keys), dtype=np.int32)
-    planes.unite_flat(keys, cells, *size, block, 1, is_flat, normals, means, COS, OFF, roots)
+    plane_patches.unite_flat(keys, cells, *size, block, 1, is_flat, normals, means, COS, OFF, roots)
     joined = are_neighbours(cells) & is_flat & is_flat[:, None]
     for i, j in itertools.combinations(range(len(cells)), 2):
         chord = means[j] - means[i]
@@ -88,7 +88,7 @@ def test_that_cells_are_inner_where_all_around_are_of_planes(rng, grid):
     _, _, _, keys, cells, sums, size, *_ = grid
     is_plane = rng.random(len(keys)) < 0.97
     is_inner = np.empty(len(keys), bool)
-    planes.mark_inner(keys, *size, is_plane, sums[:, 0].copy(), is_inner)
+    plane_patches.mark_inner(keys, *size, is_plane, sums[:, 0].copy(), is_inner)
     other = (sums[:, 0] > 0) & ~is_plane
     assert_array_equal(is_inner, is_plane & ~(are_neighbours(cells) & other).any(axis=1))
 
@@ -103,9 +103,9 @@ def test_that_a_patch_is_plane_if_it_bends_little_for_its_width(bend):
     means = np.stack([x, y, z], axis=1)
     is_plane = np.zeros(100, bool)
     roots = np.zeros(100, np.int32)
-    planes.mark_planes(means, np.ones(100, bool), roots, max_ratio, is_plane)
+    plane_patches.mark_planes(means, np.ones(100, bool), roots, max_ratio, is_plane)
     assert is_plane.all() == (bend < 1.0)
     narrow = (y > 0) & (y < 3)
     is_plane[:] = False
-    planes.mark_planes(means, narrow, np.full(100, np.flatnonzero(narrow)[0]), 1.0, is_plane)
+    plane_patches.mark_planes(means, narrow, np.full(100, np.flatnonzero(narrow)[0]), 1.0, is_plane)
     assert not is_plane.any()

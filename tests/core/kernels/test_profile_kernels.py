@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore._kernels import components, profiles
+from pipecore._kernels import disjoint_sets, profile_cuts
 from tests.core.shapes import random_rotation, unit_rows
 
 pytestmark = pytest.mark.kernels
@@ -38,15 +38,14 @@ def test_that_points_are_carried_within_their_tangent_plane_to_the_mid_plane(rng
     normals[7] = np.nan
     width, offset, max_slope = 0.4, 0.13, 0.62
     spacing = rng.uniform(0.0, 1.0, 60)
+    cut = profile_cuts.StackCut(frame[2], frame[0], frame[1], width, offset)
     index = np.empty(60, np.int32)
     limits = [
-        profiles.find_profiles(
-            xyz, normals, spacing, a, b, frame[2], width, offset, max_slope, 0.2, index
-        )
+        profile_cuts.find_profiles(xyz, normals, spacing, a, b, cut, max_slope, 0.2, index)
         for a, b in ((0, 25), (25, 60))
     ]
     slope = np.abs(normals @ frame[2])
-    usable = index != profiles.NOT_CUT
+    usable = index != profile_cuts.NOT_CUT
     assert list(usable) == [
         bool(s < max_slope and d >= 0.2) for s, d in zip(slope, spacing, strict=True)
     ]
@@ -57,9 +56,7 @@ def test_that_points_are_carried_within_their_tangent_plane_to_the_mid_plane(rng
     profile = np.zeros(60, np.int32)
     uv, mapped = np.empty((60, 2)), np.empty((60, 3))
     places, at, turned = (a[: len(points)].copy() for a in (profile, uv, mapped))
-    profiles.carry_to_mid_planes(
-        xyz, normals, points, frame[2], frame[0], frame[1], width, offset, places, at, turned
-    )
+    profile_cuts.carry_to_mid_planes(xyz, normals, points, cut, places, at, turned)
     profile[points], uv[points], mapped[points] = places, at, turned
     assert list(profile[usable]) == list(index[usable])
     for i in points:
@@ -110,14 +107,14 @@ def test_that_joined_points_are_the_components_of_the_graph_of_neighbours(
     order = np.argsort(keys, kind="stable")
     keys, profile, uv = keys[order], profile[order], uv[order]
     normals, reach = normals[order], reach[order]
+    cos_corner = -1.0 if corner_deg is None else np.cos(np.radians(corner_deg))
+    smoothness = profile_cuts.Smoothness(cos_corner, 0.01, 0.12)
     parents = np.arange(n)
     bounds = np.searchsorted(profile, [0, 2, n_profiles])
     for start, stop in itertools.pairwise(bounds):
-        profiles.join_neighbours(
-            keys, n_v, cell, uv, normals, reach,
-            -1.0 if corner_deg is None else np.cos(np.radians(corner_deg)),
-            0.01, 0.12, start, stop, parents,
-        )  # fmt: skip
+        profile_cuts.join_neighbours(
+            keys, n_v, cell, uv, normals, reach, smoothness, start, stop, parents
+        )
 
     def is_linked(i, j):
         return profile[i] == profile[j] and lie_on_one_curve(
@@ -133,8 +130,8 @@ def test_that_groups_with_a_common_point_become_one(rng):
     groups = [rng.choice(n, size=k, replace=False) for k in (1, 4, 5, 3, 6, 2)]
     starts = np.cumsum([0, *map(len, groups)])
     parents = np.arange(n)
-    components.unite_groups(np.concatenate(groups), starts, parents)
-    components.flatten(parents)
+    disjoint_sets.unite_groups(np.concatenate(groups), starts, parents)
+    disjoint_sets.flatten(parents)
     sets = [set(map(int, g)) for g in groups]
     label = connected(n, lambda i, j: any({i, j} <= s for s in sets))
     assert partition(parents) == partition(label)
@@ -145,7 +142,7 @@ def test_that_points_are_sorted_by_profile_and_cell(rng):
     n, cell = 80, 0.25
     profile = np.sort(rng.integers(-3, 2, n)).astype(np.int32)
     uv = rng.uniform(-1, 1, (n, 2)) * [1.0, 0.5]
-    order, keys, n_v = profiles.sort_by_cell(profile, uv, cell, 12)
+    order, keys, n_v = profile_cuts.sort_by_cell(profile, uv, cell, 12)
     cells = np.floor(uv / cell).astype(int)
     expected = np.lexsort((cells[:, 1], cells[:, 0], profile))
     assert list(order) == list(expected)
@@ -161,7 +158,7 @@ def test_that_groups_are_gathered_with_their_profiles(rng):
     uv, normals = rng.normal(size=(20, 2)), rng.normal(size=(20, 3))
     profile = np.repeat([4, 5], 10).astype(np.int32)
     members, starts = np.array([3, 1, 7, 15, 11]), np.array([0, 3, 5])
-    of, places, vectors, index = profiles.gather(points, uv, normals, profile, members, starts)
+    of, places, vectors, index = profile_cuts.gather(points, uv, normals, profile, members, starts)
     assert list(of) == list(points[members])
     assert_allclose(places, uv[members])
     assert_allclose(vectors, normals[members])

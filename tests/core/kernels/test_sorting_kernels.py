@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore._kernels import sorting as kernels
+from pipecore._kernels import cell_sorting as kernels
 from pipecore._kernels.grouping import spread_to_members
 from pipecore.surface import sorting
 from pipecore.surface.grid import GridFrame, bounds

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore._kernels import axes, fitting, nearby, surfaces
+from pipecore._kernels import cell_search, pipe_coordinates, surface_fit, surface_models
 from pipecore._kernels.grouping import group_by_label
 from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
@@ -20,14 +20,14 @@ pytestmark = [pytest.mark.kernels, pytest.mark.filterwarnings("ignore:overflow e
 def surface(rng, kind):
     place, d = rng.normal(size=3), random_direction(rng)
     return {
-        surfaces.CYLINDER: LineSurface(place, d, 0.1),
-        surfaces.CONE: LineSurface(place, d, 0.1, 0.2, is_tapered=True),
-        surfaces.TORUS: ArcSurface(place, d, 0.3, 0.1),
-        surfaces.SPHERE: SphereSurface(place, 0.25),
+        surface_models.CYLINDER: LineSurface(place, d, 0.1),
+        surface_models.CONE: LineSurface(place, d, 0.1, 0.2, is_tapered=True),
+        surface_models.TORUS: ArcSurface(place, d, 0.3, 0.1),
+        surface_models.SPHERE: SphereSurface(place, 0.25),
     }[kind]
 
 
-KINDS = (surfaces.CYLINDER, surfaces.CONE, surfaces.TORUS, surfaces.SPHERE)
+KINDS = (surface_models.CYLINDER, surface_models.CONE, surface_models.TORUS, surface_models.SPHERE)
 
 
 def distances(model, xyz):
@@ -58,7 +58,7 @@ def test_that_distances_are_those_of_the_shape(rng, kind):
     xyz = near_points(rng, model, off=0.05)
     residual, slopes, outward = model.residuals(xyz)
     assert_allclose(residual, distances(model, xyz), atol=1e-12)
-    assert slopes.shape == (len(xyz), surfaces.n_parameters(kind))
+    assert slopes.shape == (len(xyz), surface_models.n_parameters(kind))
     assert_allclose(np.linalg.norm(outward, axis=1), 1.0, atol=1e-12)
 
 
@@ -66,7 +66,7 @@ def test_that_there_is_no_distance_where_outward_is_not_defined(rng):
     for kind in KINDS:
         model = surface(rng, kind)
         place = model.numbers()[:3]
-        if kind == surfaces.TORUS:
+        if kind == surface_models.TORUS:
             place = place + model.bend_radius * model.numbers()[6:9]
         residual, _, outward = model.residuals(place[None])
         on_axis = not np.isfinite(residual[0]) and not np.isfinite(outward).any()
@@ -78,9 +78,9 @@ def test_that_there_is_no_distance_where_outward_is_not_defined(rng):
 def test_that_normal_equations_are_the_weighted_sums(rng, kind):
     model = surface(rng, kind)
     xyz, reach = near_points(rng, model), 0.008
-    p = surfaces.n_parameters(kind)
+    p = surface_models.n_parameters(kind)
     residuals, normal, right = np.empty(len(xyz)), np.empty((p, p)), np.empty(p)
-    n = fitting.weighted_normal_equations(
+    n = surface_fit.weighted_normal_equations(
         kind, model.numbers(), xyz, reach, residuals, normal, right
     )
     residual, slopes, _ = model.residuals(xyz)
@@ -89,22 +89,22 @@ def test_that_normal_equations_are_the_weighted_sums(rng, kind):
     assert_allclose(residuals, residual)
     assert_allclose(normal, slopes.T @ (weight[:, None] * slopes), atol=1e-12)
     assert_allclose(right, slopes.T @ (weight * residual), atol=1e-12)
-    assert fitting.spread_within(residual, reach) == pytest.approx(
+    assert surface_fit.spread_within(residual, reach) == pytest.approx(
         1.4826 * np.median(np.abs(residual[weight > 0]))
     )
     step = 1e-3 * rng.normal(size=p)
     largest = np.abs(slopes @ step).max()
-    assert fitting.moves_less(kind, model.numbers(), xyz, step, 1.001 * largest)
-    assert not fitting.moves_less(kind, model.numbers(), xyz, step, 0.999 * largest)
+    assert surface_fit.moves_less(kind, model.numbers(), xyz, step, 1.001 * largest)
+    assert not surface_fit.moves_less(kind, model.numbers(), xyz, step, 0.999 * largest)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_that_a_fit_is_judged_by_the_sums_over_its_points(rng, kind):
     model = surface(rng, kind)
     xyz, reach = near_points(rng, model), 0.008
-    p = surfaces.n_parameters(kind)
+    p = surface_models.n_parameters(kind)
     information, scatter, beam = np.empty((p, p)), np.empty((p, p)), np.empty(3)
-    n, sigma = fitting.judge_fit(kind, model.numbers(), xyz, reach, information, scatter, beam)
+    n, sigma = surface_fit.judge_fit(kind, model.numbers(), xyz, reach, information, scatter, beam)
     residual, slopes, outward = model.residuals(xyz)
     used = np.abs(residual) < reach
     residual, slopes, outward = residual[used], slopes[used], outward[used]
@@ -120,11 +120,11 @@ def test_that_a_fit_is_judged_by_the_sums_over_its_points(rng, kind):
 
     beam = unit(outward[0])
     facing = outward @ beam
-    faced = facing > fitting.FACING
-    noise = fitting.noise_along(kind, model.numbers(), xyz, reach, beam)
+    faced = facing > surface_fit.FACING
+    noise = surface_fit.noise_along(kind, model.numbers(), xyz, reach, beam)
     assert noise == pytest.approx(1.4826 * np.median(np.abs(residual[faced] / facing[faced])))
     steps, shares, found = np.array([-0.002, 0.003]), np.array([0.4, 0.6]), np.empty(p)
-    fitting.pull_along(kind, model.numbers(), xyz, reach, beam, steps, shares, found)
+    surface_fit.pull_along(kind, model.numbers(), xyz, reach, beam, steps, shares, found)
     on = xyz[used] - residual[:, None] * outward
     expected = np.zeros(p)
     for step, share in zip(steps, shares, strict=True):
@@ -148,11 +148,11 @@ def test_that_pipe_coordinates_are_those_of_the_axis(rng):
     for axis in axes_of(rng):
         xyz = axis.at(0.1) + 0.4 * rng.normal(size=(100, 3))
         found = np.empty((3, len(xyz)))
-        axes.pipe_coordinates(axis.numbers, xyz, *found)
+        pipe_coordinates.pipe_coordinates(axis.numbers, xyz, *found)
         assert_allclose(found, axis.pipe_coordinates(xyz), atol=1e-12)
         s = rng.uniform(-0.2, 1.0)
-        assert_allclose(nearby.place_on_axis(axis.numbers, s), axis.at(s), atol=1e-12)
-        assert_allclose(nearby.tangent(axis.numbers, s), axis.tangent(s), atol=1e-12)
+        assert_allclose(cell_search.place_on_axis(axis.numbers, s), axis.at(s), atol=1e-12)
+        assert_allclose(cell_search.tangent(axis.numbers, s), axis.tangent(s), atol=1e-12)
 
 
 def cloud_around(rng, axis, n=400):

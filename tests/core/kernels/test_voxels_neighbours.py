@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from pipecore._kernels import neighbours, spacing, voxels
+from pipecore._kernels import local_surfaces, nearest_neighbours, voxel_hash
 from pipecore._kernels.grouping import argsort_keys, group_by_label, group_from, group_large
 from pipecore.surface.grid import GridFrame, VoxelCounter, empty_table, table_of
 from pipecore.surface.sorting import CellGrid
@@ -30,13 +30,11 @@ def test_that_points_share_a_number_as_they_share_a_cube(rng):
     frame = GridFrame.of(xyz, edge)
     ids = np.empty(len(xyz), np.int32)
     # A crowded table makes keys collide.
-    table_keys, table_ids = np.full(256, voxels.EMPTY), np.empty(256, np.int32)
+    table = voxel_hash.HashTable(np.full(256, voxel_hash.EMPTY), np.empty(256, np.int32))
     keys = np.empty(200, np.int64)
     n = 0
     for start, stop in ((0, 70), (70, 150)):
-        reached, n = voxels.number_voxels(
-            xyz, start, stop, *frame.numbers, table_keys, table_ids, n, keys, ids
-        )
+        reached, n = voxel_hash.number_voxels(xyz, start, stop, frame.numbers, table, n, keys, ids)
         assert reached == stop
     cells = cells_of(xyz, edge)
     assert_array_equal(keys[ids], frame.keys(xyz))
@@ -49,7 +47,7 @@ def test_that_a_full_table_tells_where_to_go_on(rng):
     frame = GridFrame.of(xyz, edge)
     ids, keys = np.empty(50, np.int32), np.empty(50, np.int64)
     table = empty_table(8)
-    reached, n = voxels.number_voxels(xyz, 0, 50, *frame.numbers, *table, 0, keys, ids)
+    reached, n = voxel_hash.number_voxels(xyz, 0, 50, frame.numbers, table, 0, keys, ids)
     assert n == len(table[0]) // 2
     assert len(cells_of(xyz[:reached], edge)) == n
     assert len(cells_of(xyz[: reached + 1], edge)) == n + 1
@@ -68,15 +66,15 @@ def test_that_a_counter_that_grows_numbers_every_cube_once(rng):
 
 def test_that_a_key_is_found_where_it_was_put_and_an_absent_one_nowhere(rng):
     keys = rng.choice(2**40, size=60, replace=False)
-    table_keys, table_ids = empty_table(30)
+    table = table_keys, table_ids = empty_table(30)
     assert len(table_keys) == 64
-    voxels.fill_table(keys[:50], table_keys, table_ids)
+    voxel_hash.fill_table(keys[:50], table)
     for i, key in enumerate(keys):
-        slot = voxels.slot_of(key, table_keys, np.int64(63))
+        slot = voxel_hash.slot_of(key, table_keys, np.int64(63))
         if i < 50:
             assert (table_keys[slot], table_ids[slot]) == (key, i)
         else:
-            assert table_keys[slot] == voxels.EMPTY
+            assert table_keys[slot] == voxel_hash.EMPTY
 
 
 def test_that_the_sorted_grid_holds_every_point_in_its_cell(rng):
@@ -104,8 +102,8 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
     n = len(xyz)
     normals, residuals, spacings = np.empty((n, 3)), np.empty(n), np.empty(n)
     for start, stop in ((0, 7), (7, len(grid.cell_keys))):
-        neighbours.fit_planes(
-            sorted_xyz, *grid.rows, radius, least_neighbours, start, stop, np.arange(n),
+        local_surfaces.fit_planes(
+            sorted_xyz, grid.rows, radius, least_neighbours, start, stop, np.arange(n),
             normals, residuals, spacings,
         )  # fmt: skip
     reaches = []
@@ -136,8 +134,8 @@ def test_that_local_axes_are_those_of_all_normals_within_reach(rng):
     sample = np.arange(0, 80, 2)
     cells = np.searchsorted(grid.cell_keys, GridFrame.of(xyz, radius).keys(xyz[sample]))
     axes, spreads = np.empty((40, 3)), np.empty((40, 3))
-    neighbours.fit_local_axes(
-        xyz, normals, grid.order, *grid.lookup, radius, sample, cells, 0, 40, axes, spreads
+    local_surfaces.fit_local_axes(
+        xyz, normals, grid.lookup, radius, sample, cells, 0, 40, axes, spreads
     )
     n_known = 0
     for k, i in enumerate(sample):
@@ -186,7 +184,7 @@ def test_that_the_radix_sort_is_stable(rng, largest):
 def test_that_a_hash_of_places_is_that_of_the_coordinates_bits(rng):
     xyz = rng.normal(size=(20, 3)).astype(np.float32)
     hashes = np.empty(12, np.uint64)
-    spacing.hash_places(xyz, 5, 17, hashes)
+    nearest_neighbours.hash_places(xyz, 5, 17, hashes)
     factors = (0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9)
     for row, p in zip(hashes, xyz[5:17].astype(np.float64), strict=True):
         bits = map(int, p.view(np.uint64))
@@ -197,9 +195,9 @@ def test_that_a_hash_of_places_is_that_of_the_coordinates_bits(rng):
 def test_that_places_are_drawn_by_their_hashes(rng):
     xyz = rng.normal(size=(3000, 3))
     hashes = np.empty(2900, np.uint64)
-    spacing.hash_places(xyz, 50, 2950, hashes)
+    nearest_neighbours.hash_places(xyz, 50, 2950, hashes)
     bound, drawn = np.sort(hashes)[99], np.empty(2900, np.int64)
-    n = spacing.draw_places(xyz, 50, 2950, bound, drawn)
+    n = nearest_neighbours.draw_places(xyz, 50, 2950, bound, drawn)
     assert_array_equal(drawn[:n], 50 + np.flatnonzero(hashes <= bound))
     assert n == 100
 
@@ -213,12 +211,12 @@ def test_that_the_nearest_in_the_cells_are_those_of_a_tree(rng):
     marked = np.unique(frame.keys(sample)[:, None] + around)
     table = table_of(marked)
     found, cells = np.empty(90, np.int64), np.empty(90, np.int32)
-    n = spacing.collect_marked(xyz, 0, 90, *frame.numbers, *table, found, cells)
+    n = nearest_neighbours.collect_marked(xyz, 0, 90, frame.numbers, table, found, cells)
     assert {*found[:n]} == {*np.flatnonzero(np.isin(frame.keys(xyz), marked))}
     order, starts = group_by_label(cells[:n], len(marked))
     reach = np.empty(len(sample))
-    spacing.nearest_in_cells(
-        xyz, sample, *frame.numbers, *table, found[:n][order], starts, k, reach
+    nearest_neighbours.nearest_in_cells(
+        xyz, sample, frame.numbers, table, found[:n][order], starts, k, reach
     )
     true = cKDTree(xyz).query(sample, k)[0][:, -1]
     assert_allclose(reach, np.where(true <= edge, true, np.nan))
@@ -234,9 +232,9 @@ def test_that_sums_are_those_of_the_points_within_reach(rng):
     assert len(near) > 5
     columns, place = xyz.T.astype(np.float32), xyz[7].astype(np.float32)
     sums = np.full(10, np.nan)
-    neighbours.sums_within(*columns, *place, np.float32(reach**2), sums)
+    local_surfaces.sums_within(*columns, *place, np.float32(reach**2), sums)
     assert_allclose(sums, expected, atol=1e-5)
-    neighbours.sum_ranges(xyz, 7, 2, np.array([0, 90]), np.array([90, 200]), reach, sums)
+    local_surfaces.sum_ranges(xyz, 7, 2, np.array([0, 90]), np.array([90, 200]), reach, sums)
     assert_allclose(sums, expected, atol=1e-12)
 
 
@@ -245,4 +243,4 @@ def test_that_the_first_key_from_a_place_on_is_found(rng):
     for begin in (0, 3, 200, len(keys) - 1, len(keys)):
         for low in (0, *rng.integers(0, 3100, 30), 4000):
             expected = max(begin, np.searchsorted(keys, low))
-            assert neighbours.first_from(keys, begin, low) == expected
+            assert local_surfaces.first_from(keys, begin, low) == expected

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import bends as kernels
+from pipecore._kernels import bend_support as kernels
 from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
 from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
 from pipecore.elements.refinement.nearby_points import NearbyPoints

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import bends as kernels
+from pipecore._kernels import bend_support as kernels
 from pipecore.elements.fittings.straight_ends import NO_ELLIPSES, StraightEnd
 from pipecore.elements.proposals import Proposal, arc_angles
 from pipecore.elements.refinement.nearby_points import NearbyPoints

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import extent as kernels
+from pipecore._kernels import axis_rows as kernels
 from pipecore._kernels import misfit as misfit_kernels
 
 Array = NDArray[np.float64]

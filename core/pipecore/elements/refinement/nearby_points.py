@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import nearby as kernels
+from pipecore._kernels import cell_search as kernels
 from pipecore._kernels.grouping import group_by_label, group_into
-from pipecore._kernels.voxels import rename_voxels
+from pipecore._kernels.voxel_hash import rename_voxels
 from pipecore.allocation import Allocate, in_memory
 from pipecore.elements.refinement.section_model import SectionModel
 from pipecore.elements.refinement.surface_fits import SphereSurface, SurfaceModel
@@ -125,28 +125,23 @@ class NearbyPoints:
         table = table_of(coarse_numbers)
         order, cell_starts = group_by_label(coarse, len(coarse_numbers))
         middles = (first + place[order] + 0.5) * edge
-        self._grid = (
-            first * edge, COARSE * edge, coarse_y, coarse_z, *table, cell_starts, middles,
-            0.5 * np.sqrt(3.0) * edge + 1e-6,
-        )  # fmt: skip
         rank = np.empty(len(order), np.int32)
         rank[order] = np.arange(len(order), dtype=np.int32)
         progress.update("elements", BEGUN)
         rename_voxels(cell, 0, len(cell), rank)
         points = allocate("points_of_cells", (len(cell),), np.int32)
-        self._cells = points, group_into(cell, len(order), points)
+        starts = group_into(cell, len(order), points)
+        self._grid = kernels.PointCells(
+            np.asarray(first * edge, np.float64), COARSE * edge, coarse_y, coarse_z, table,
+            cell_starts, middles, 0.5 * np.sqrt(3.0) * edge + 1e-6, points, starts,
+        )  # fmt: skip
 
     def around_axis(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Downsampled points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
         inner, outer = INNER * radius, OUTER * radius
-        cells = kernels.cells_around(
-            *self._grid, axis.numbers, inner, outer, -margin, axis.length + margin
-        )
-        return np.asarray(
-            kernels.points_around(
-                self.surface.xyz, *self._cells, cells, axis.numbers, inner, outer, margin
-            )
-        )
+        tube = kernels.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
+        cells = kernels.cells_around(self._grid, tube)
+        return np.asarray(kernels.points_around(self.surface.xyz, self._grid, cells, tube))
 
     def on_surface(
         self,
@@ -179,23 +174,24 @@ class NearbyPoints:
             Whether a sample of the points will do where there are many.
         """
         inner, outer = INNER * model.radius, OUTER * model.radius
-        numbers, shape = axis.numbers, (model.kind, model.numbers())
-        points = self.surface.xyz, self.surface.normals
+        points = kernels.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
+        target = kernels.Target(model.kind, model.numbers(), band, depth, min_cos)
+        tube = kernels.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
         # Only in a shell about the surface, which for a cone is not about one distance.
-        shell = inner, outer
+        shell = tube
         if not model.is_conical:
-            shell = max(inner, model.radius - band), min(outer, model.radius + band)
-        own, columns, spacing = kernels.look_on(
-            self._grid, *points, self.surface.spacing, self.surface.voxel, is_free, *self._cells,
-            numbers, shell, inner, outer, margin, *shape, band, min_cos, FEW if is_rough else 0,
+            shell = tube._replace(
+                inner=max(inner, model.radius - band), outer=min(outer, model.radius + band)
+            )
+        own, columns, spacing = kernels.points_on_surface(
+            points, self.surface.spacing, self.surface.voxel, self._grid, tube, shell, target,
+            FEW if is_rough else 0,
         )  # fmt: skip
 
         def look_inside(begin: float, end: float) -> Array:
-            cells = kernels.cells_around(*self._grid, numbers, inner, outer, begin, end)
-            found: Array = kernels.points_inside(
-                *points, *self._cells, cells, numbers, inner, outer, begin, end,
-                *shape, depth, min_cos,
-            )  # fmt: skip
+            part = tube._replace(begin=begin, end=end)
+            cells = kernels.cells_around(self._grid, part)
+            found: Array = kernels.points_inside(points, self._grid, cells, part, target)
             return found
 
         residual, chainage, clock, lean = columns
@@ -216,12 +212,12 @@ class NearbyPoints:
         """
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
         inner = model.radius - band
-        cells = kernels.cells_in_shell(*self._grid, model.centre, inner, outer)
-        stride = kernels.stride_of(self._cells[1], cells, FEW if is_rough else 0)
+        cells = kernels.cells_in_shell(self._grid, model.centre, inner, outer)
+        stride = kernels.stride_of(self._grid, cells, FEW if is_rough else 0)
         return np.asarray(
             kernels.points_on_sphere(
-                self.surface.xyz, self.surface.normals, is_free, *self._cells, cells,
-                model.centre, inner, outer, min_cos, stride,
+                kernels.OrientedPoints(self.surface.xyz, self.surface.normals, is_free),
+                self._grid, cells, model.centre, inner, outer, min_cos, stride,
             )
         )  # fmt: skip
 
@@ -231,9 +227,9 @@ class NearbyPoints:
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
         """Downsampled points within `radius` of a place, in order."""
-        cells = kernels.cells_in_shell(*self._grid, centre, 0.0, radius)
+        cells = kernels.cells_in_shell(self._grid, centre, 0.0, radius)
         return np.asarray(
-            kernels.points_in_ball(self.surface.xyz, *self._cells, cells, centre, radius)
+            kernels.points_in_ball(self.surface.xyz, self._grid, cells, centre, radius)
         )
 
     def full_resolution(self, downsampled: Indices) -> tuple[Indices, Array]:
@@ -244,7 +240,9 @@ class NearbyPoints:
         """
         n = int(self._n_behind(downsampled).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
-        kernels.behind(self._members, self._starts, downsampled, self._cloud.xyz, index, xyz)
+        kernels.full_resolution_points(
+            self._members, self._starts, downsampled, self._cloud.xyz, index, xyz
+        )
         return index, xyz
 
     def full_resolution_with_normals(self, downsampled: Indices) -> tuple[Indices, Array, Array]:

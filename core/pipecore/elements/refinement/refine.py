@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels.extent import points_between
-from pipecore._kernels.misfit import look_at_sphere
+from pipecore._kernels.axis_rows import points_between
+from pipecore._kernels.misfit import sphere_misfit
 from pipecore.elements.proposals import Proposal, arc_direction
 from pipecore.elements.refinement.extent import (
     MAX_SECTORS,
@@ -534,7 +534,7 @@ def _fitted_sphere(
     fit: SurfaceFit[SphereSurface], own: Indices, nearby: NearbyPoints
 ) -> FittedElement:
     model, upright = fit.model, np.array([0.0, 0.0, 1.0])
-    misfit, low, high, arc = look_at_sphere(
+    misfit, low, high, arc = sphere_misfit(
         nearby.surface.xyz, own, model.centre, model.radius, MAX_SECTORS, *PATCHES
     )
     axis = LineAxis(model.centre + low * upright, upright, high - low)

@@ -1,7 +1,7 @@
 """Cylinders, cones, tori and spheres fitted to points: robust geometric least squares.
 
 Residuals are signed distances along the radius, positive outside. The arithmetic is that
-of `pipecore._kernels.surfaces`, which also tells the parameters of each kind; here are the
+of `pipecore._kernels.surface_models`, which also tells the parameters of each kind; here are the
 surfaces' names, and what a fit tells of them.
 """
 
@@ -11,8 +11,8 @@ from typing import ClassVar, Generic, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import fitting
-from pipecore._kernels import surfaces as kernels
+from pipecore._kernels import surface_fit
+from pipecore._kernels import surface_models as kernels
 from pipecore.geometry import ArcAxis, LineAxis, unit
 
 Array = NDArray[np.float64]
@@ -20,10 +20,13 @@ Array = NDArray[np.float64]
 
 CONVERGED, ROUGHLY = 1e-6, 2e-5
 """A fit ends when no point's distance changes by more than this, metres; a rough one earlier."""
-NORMAL_STEPS = np.array([-2.334, -0.742, 0.742, 2.334]), np.array([0.0459, 0.4541, 0.4541, 0.0459])
+BEAM_NOISE = surface_fit.BeamNoise(
+    min_one_sided=0.55,  # seen over less than 200°
+    steps=np.array([-2.334, -0.742, 0.742, 2.334]),
+    shares=np.array([0.0459, 0.4541, 0.4541, 0.0459]),
+)
 """Nodes and weights of Gauss and Hermite's quadrature for the standard normal distribution."""
-ONE_SIDED = 0.55
-"""Length of the mean of a surface's normals from which on it is seen from one side (200°)."""
+NO_CORRECTION = BEAM_NOISE._replace(min_one_sided=np.inf)
 
 
 class SurfaceModel(Protocol):
@@ -241,8 +244,8 @@ def fit_surface(
     kind, numbers = model.kind, model.numbers()
     p = kernels.n_parameters(kind)
     covariance = np.empty((p, p))
-    converged, one_sided = (ROUGHLY, np.inf) if is_rough else (CONVERGED, ONE_SIDED)
-    n, sigma = fitting.fit_surface(
-        kind, numbers, xyz, scale, n_iterations, converged, one_sided, *NORMAL_STEPS, covariance
+    converged, noise = (ROUGHLY, NO_CORRECTION) if is_rough else (CONVERGED, BEAM_NOISE)
+    n, sigma = surface_fit.fit_surface(
+        kind, numbers, xyz, scale, n_iterations, converged, noise, covariance
     )
     return SurfaceFit(model.from_numbers(numbers), covariance, sigma, n) if n else None

@@ -4,15 +4,22 @@ import math
 
 from numba import njit
 
-from pipecore._kernels.axes import across_axis, polar
+from pipecore._kernels.pipe_coordinates import across_axis, polar
 
 
 @njit(cache=True, nogil=True)
 def facing(axis, slope, x, y, z, nx, ny, nz):
-    """Chainage, distance and clock of a point, and how its normal agrees with the surface's.
+    """Return chainage, distance and clock of a point, and how its normal agrees with a surface's.
 
-    The surface is one of revolution whose radius grows by `slope` per chainage; what is
-    returned is the cosine of the angle between the normals, times the distance from the axis.
+    The surface is one of revolution. The last value is the cosine between the normals times the
+    distance from the axis.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    slope : change of radius per metre of chainage
+    x, y, z : point, metres
+    nx, ny, nz : its unit normal
     """
     chainage, up, right = across_axis(axis, x, y, z)
     rho, clock = polar(up, right)
@@ -37,7 +44,15 @@ def facing(axis, slope, x, y, z, nx, ny, nz):
 
 @njit(cache=True, nogil=True)
 def unroll(axis, radius, slope, xyz, normals, chainage, rho, clock, height, alignment):
-    """Write pipe coordinates of points, their height above a surface, and |cosines| to it."""
+    """Write pipe coordinates of points, their height above a surface, and |cosines| to its normal.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    radius, slope : radius at chainage 0, metres, and its change per metre
+    xyz, normals (n, 3) : points, metres, and unit normals
+    chainage, rho, clock, height, alignment (n,) : filled, metres and radians
+    """
     steep = math.sqrt(1.0 + slope * slope)
     for i in range(xyz.shape[0]):
         s, distance, theta, along = facing(

@@ -2,56 +2,61 @@
 
 import math
 
+import numpy as np
 from numba import njit
 
-from pipecore._kernels.draws import draw, seeded
+from pipecore._kernels.random_draws import draw, seeded
 
 
 @njit(cache=True, nogil=True)
-def on_arc(
-    cx,
-    cy,
-    cz,
-    ax,
-    ay,
-    az,
-    r,
-    sd,
-    ox,
-    oy,
-    oz,
-    nx,
-    ny,
-    nz,
-    bend,
-    radius,
-    min_cos,
-    max_offset,
-    max_change,
-):
-    """Whether an ellipse fits a circular axis of constant radius."""
-    if abs(r - radius) > max_change * radius + 2.0 * sd:
+def on_arc(ellipses, k, arc, limits):
+    """Return whether an ellipse fits a circular axis of constant radius.
+
+    Parameters
+    ----------
+    ellipses : AxisEllipses
+    k : index of the ellipse
+    arc (8,) : centre, unit normal, bend radius and pipe radius, metres
+    limits : PieceLimits
+    """
+    axis, centre, sd = ellipses.axis, ellipses.centre, ellipses.radius_sd[k]
+    nx, ny, nz, bend, radius = arc[3], arc[4], arc[5], arc[6], arc[7]
+    if abs(ellipses.radius[k] - radius) > limits.max_change * radius + 2.0 * sd:
         return False
-    qx, qy, qz = cx - ox, cy - oy, cz - oz
+    qx, qy, qz = centre[k, 0] - arc[0], centre[k, 1] - arc[1], centre[k, 2] - arc[2]
     h = qx * nx + qy * ny + qz * nz
     rx, ry, rz = qx - h * nx, qy - h * ny, qz - h * nz
     rho = math.sqrt(rx * rx + ry * ry + rz * rz)
-    limit = max_offset * radius + 2.0 * min(sd, 0.03 * radius)
+    limit = limits.max_offset * radius + 2.0 * min(sd, 0.03 * radius)
     if (rho - bend) ** 2 + h * h > limit * limit or rho == 0.0:
         return False
     tx, ty, tz = ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx
-    return abs(ax * tx + ay * ty + az * tz) >= min_cos * rho
+    along = abs(axis[k, 0] * tx + axis[k, 1] * ty + axis[k, 2] * tz)
+    return along >= limits.min_cos * rho
 
 
 @njit(cache=True, nogil=True)
-def best_arc(
-    centre, axis, radius, sd, free, n_trials, min_cos, max_offset, max_change, inliers, arc
-):
+def best_arc(ellipses, free, n_trials, limits, inliers, arc):
     """Find the circular piece with most ellipses, from pairs of centres with their axes.
 
-    Writes the inliers and the arc (centre, normal, bend radius); returns their number.
+    Two ellipses with their axes define an arc; the pairs are drawn at random, always the same.
+
+    Parameters
+    ----------
+    ellipses : AxisEllipses, n of them
+    free (n,) : ellipses that may be used
+    n_trials : number of pairs
+    limits : PieceLimits
+    inliers (n,) : filled with which ellipses fit the arc
+    arc (8,) : filled with centre, unit normal, bend radius and pipe radius, metres
+
+    Returns
+    -------
+    Number of inliers, 0 where no pair defines an arc.
     """
+    centre, axis, radius = ellipses.centre, ellipses.axis, ellipses.radius
     n = centre.shape[0]
+    trial = np.empty(8)
     best = 0
     state = seeded(n)
     for _ in range(n_trials):
@@ -60,7 +65,7 @@ def best_arc(
         if i == j or not free[i] or not free[j]:
             continue
         r = 0.5 * (radius[i] + radius[j])
-        if abs(radius[i] - radius[j]) > max_change * r:
+        if abs(radius[i] - radius[j]) > limits.max_change * r:
             continue
         wx, wy, wz = (
             centre[j, 0] - centre[i, 0],
@@ -87,57 +92,18 @@ def best_arc(
         if not 1.02 * r < bend < 12.0 * r:
             continue
         ox, oy, oz = centre[i, 0] + bend * ux, centre[i, 1] + bend * uy, centre[i, 2] + bend * uz
+        trial[0], trial[1], trial[2] = ox, oy, oz
+        trial[3], trial[4], trial[5] = nx, ny, nz
+        trial[6], trial[7] = bend, r
         count = 0
         for k in range(n):
-            if free[k] and on_arc(
-                centre[k, 0],
-                centre[k, 1],
-                centre[k, 2],
-                axis[k, 0],
-                axis[k, 1],
-                axis[k, 2],
-                radius[k],
-                sd[k],
-                ox,
-                oy,
-                oz,
-                nx,
-                ny,
-                nz,
-                bend,
-                r,
-                min_cos,
-                max_offset,
-                max_change,
-            ):
+            if free[k] and on_arc(ellipses, k, trial, limits):
                 count += 1
         if count > best:
             best = count
-            arc[0], arc[1], arc[2] = ox, oy, oz
-            arc[3], arc[4], arc[5] = nx, ny, nz
-            arc[6], arc[7] = bend, r
+            arc[:] = trial
     if best == 0:
         return 0
     for k in range(n):
-        inliers[k] = free[k] and on_arc(
-            centre[k, 0],
-            centre[k, 1],
-            centre[k, 2],
-            axis[k, 0],
-            axis[k, 1],
-            axis[k, 2],
-            radius[k],
-            sd[k],
-            arc[0],
-            arc[1],
-            arc[2],
-            arc[3],
-            arc[4],
-            arc[5],
-            arc[6],
-            arc[7],
-            min_cos,
-            max_offset,
-            max_change,
-        )
+        inliers[k] = free[k] and on_arc(ellipses, k, arc, limits)
     return best

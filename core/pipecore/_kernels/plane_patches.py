@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
+from pipecore._kernels.disjoint_sets import find_root, unite
 from pipecore._kernels.eigen import eigenvalues, eigenvector
-from pipecore._kernels.profiles import find_root, unite
 
 SCALE = 2.0**20
 N_SUMS = 10
@@ -22,13 +22,26 @@ MIN_CELLS, MIN_ACROSS = 12, 1.0
 
 @njit(cache=True, nogil=True)
 def whole(value):
-    """The nearest whole number of units."""
+    """Return the nearest whole number of units of 1 / `SCALE`.
+
+    Parameters
+    ----------
+    value : any unit
+    """
     return np.int64(math.floor(value * SCALE + 0.5))
 
 
 @njit(cache=True, nogil=True)
 def add_to_cells(xyz, normals, ids, edge, sums):
-    """Add each point that has a normal to the sums of its cell, whose edge is `edge`."""
+    """Add points that have a normal to the sums of their cells.
+
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals, nan where not known
+    ids (n,) : cell of each point
+    edge : of a cell, metres
+    sums (c, N_SUMS) : added to
+    """
     for i in range(ids.shape[0]):
         x, y, z = normals[i, 0], normals[i, 1], normals[i, 2]
         if math.isnan(x):
@@ -52,10 +65,19 @@ def describe_cells(
 ):
     """Write whether each cell and those around it are flat, their normal, and the cell's mean.
 
-    `keys` ascend and number the cells row by row, `n_z` to a row. A place is flat if the
-    second eigenvalue of Σnnᵀ is at most `max_spread` of the sum of all, and at most
-    `max_curved` above the least: noise turns normals alike in both directions, a curved
-    surface in one. Means are in cells' edges; nan where no point has a normal.
+    A place is flat if the second eigenvalue of Σnnᵀ is small, and hardly above the least: noise
+    turns normals alike in both directions, a curved surface in one.
+
+    Parameters
+    ----------
+    keys (c,) : numbers of the cells, ascending, row by row
+    cells (c, 3) : the cells
+    sums (c, N_SUMS) : see the module
+    n_y, n_z : numbers of cells along y and z
+    min_points : least number of points of a cell and those around it
+    max_spread : largest second eigenvalue, fraction of the sum of all
+    max_curved : largest difference of the two smaller eigenvalues, fraction of that sum
+    is_flat (c,), normals, means (c, 3) : filled; means in edges; nan where not known
     """
     n = keys.shape[0]
     begins = np.zeros(9, np.int64)
@@ -93,11 +115,19 @@ def describe_cells(
 def unite_flat(
     keys, cells, n_y, n_z, block, begin, is_member, normals, means, min_cos, max_offset, parents
 ):
-    """Unite neighbouring cells, of the `is_member`, that go on in each other within a block.
+    """Unite neighbouring cells that continue each other within a block.
 
-    They do where their normals differ by no more than the angle of `min_cos` and neither's
-    mean is off the other's plane by more than `max_offset` edges. A block is a cube of
-    `block` cells a side, counted from the cell `begin`; without bounds if 0.
+    Parameters
+    ----------
+    keys (c,) : numbers of the cells, ascending, row by row
+    cells (c, 3) : the cells
+    n_y, n_z : numbers of cells along y and z
+    block : cells along a side of a block; 0 for no bounds
+    begin : cell from which blocks count
+    is_member (c,) : cells that may be united
+    normals, means (c, 3) : of the cells, means in edges
+    min_cos, max_offset : see `goes_on`
+    parents (c,) : filled with the root of each cell
     """
     n = keys.shape[0]
     begins = np.zeros(5, np.int64)
@@ -127,7 +157,17 @@ def unite_flat(
 
 @njit(cache=True, nogil=True)
 def goes_on(i, j, cells, block, begin, normals, means, min_cos, max_offset):
-    """Whether two neighbouring cells are of one block and one smooth surface."""
+    """Return whether two neighbouring cells are of one block and one smooth surface.
+
+    Parameters
+    ----------
+    i, j : indices of the cells
+    cells (c, 3) : the cells
+    block, begin : see `unite_flat`
+    normals, means (c, 3) : of the cells, means in edges
+    min_cos : least cosine between normals
+    max_offset : largest distance of a mean from the other's plane, edges
+    """
     cos = off_i = off_j = 0.0
     for k in range(3):
         if block > 0 and (cells[i, k] - begin) // block != (cells[j, k] - begin) // block:
@@ -141,11 +181,18 @@ def goes_on(i, j, cells, block, begin, normals, means, min_cos, max_offset):
 
 @njit(cache=True, nogil=True)
 def mark_planes(means, is_flat, roots, max_ratio, is_plane):
-    """Mark the cells of patches, flat cells of one root, that are plane; leave the others' marks.
+    """Mark the cells of patches, flat cells of one root, that are plane.
 
-    A patch is if its root mean square distance from its plane is at most `max_ratio` times
-    the mean square of its extent across, along the shorter of its sides, and it is not so
-    small that any would be.
+    A patch is if its root mean square distance from its plane is small against the mean square
+    of its shorter extent, and it is not too small to tell.
+
+    Parameters
+    ----------
+    means (c, 3) : of the cells, in edges
+    is_flat (c,) : cells that count
+    roots (c,) : patch of each cell
+    max_ratio : of that distance and that mean square, 1/edges
+    is_plane (c,) : set for those cells, other marks are left
     """
     n = roots.shape[0]
     sums = np.zeros((n, N_SUMS))
@@ -185,7 +232,16 @@ def mark_planes(means, is_flat, roots, max_ratio, is_plane):
 
 @njit(cache=True, nogil=True)
 def mark_inner(keys, n_y, n_z, is_plane, counts, is_inner):
-    """Mark the cells of planes around which all cells that hold points are of planes too."""
+    """Mark the cells of planes around which all cells that hold points are of planes too.
+
+    Parameters
+    ----------
+    keys (c,) : numbers of the cells, ascending, row by row
+    n_y, n_z : numbers of cells along y and z
+    is_plane (c,) : cells of planes
+    counts (c,) : points of each cell
+    is_inner (c,) : filled
+    """
     n = keys.shape[0]
     begins = np.zeros(9, np.int64)
     for c in range(n):

@@ -9,12 +9,19 @@ from pipecore._kernels.grouping import group_by_label
 from pipecore._kernels.linear import solve_in_place
 
 OVAL_SECTORS = 36
-"""Sectors around the axis whose means tell an oval section."""
+"""Sectors around the axis whose means define an oval section."""
 
 
 @njit(cache=True, nogil=True)
 def upper_medians(values, group, medians):
-    """Write the (upper) median of the values of each group, infinite where there are none."""
+    """Write the upper median of the values of each group, infinite for empty groups.
+
+    Parameters
+    ----------
+    values (n,) : any unit
+    group (n,) : group of each value
+    medians (m,) : filled
+    """
     members, starts = group_by_label(group, medians.shape[0])
     ordered = values[members]
     for k in range(medians.shape[0]):
@@ -25,7 +32,14 @@ def upper_medians(values, group, medians):
 
 @njit(cache=True, nogil=True)
 def rows_of(chainage, base, step):
-    """Number of the step of axis of each point."""
+    """Return the step of axis that each point lies in.
+
+    Parameters
+    ----------
+    chainage (n,) : metres
+    base : chainage where step 0 begins, metres
+    step : length of a step, metres
+    """
     row = np.empty(chainage.shape[0], np.int64)
     for i in range(chainage.shape[0]):
         row[i] = math.floor((chainage[i] - base) / step)
@@ -34,7 +48,14 @@ def rows_of(chainage, base, step):
 
 @njit(cache=True, nogil=True)
 def mark_sectors(group, clock, seen):
-    """Mark the sectors around the axis in which each group (n_groups, n_sectors) has points."""
+    """Mark the sectors around the axis in which each group has points.
+
+    Parameters
+    ----------
+    group (n,) : group of each point; points of others are left out
+    clock (n,) : clock angles, radians
+    seen (groups, sectors) : filled
+    """
     n_sectors = seen.shape[1]
     seen[:, :] = False
     for i in range(group.shape[0]):
@@ -44,8 +65,18 @@ def mark_sectors(group, clock, seen):
 
 
 @njit(cache=True, nogil=True)
-def turn_of_normals(clock, lean, group, turning):
-    """Write how much the normals of each group turn with the clock: slope of lean, plus one."""
+def normal_turning(clock, normal_angle, group, turning):
+    """Write how much the normals of each group turn with the clock: 1 on a pipe, 0 on a plane.
+
+    It is one plus the slope of the normals' angle against the clock angle, by least squares.
+
+    Parameters
+    ----------
+    clock (n,) : clock angles, radians
+    normal_angle (n,) : angle from the surface's normal to the point's, radians
+    group (n,) : group of each point
+    turning (m,) : filled; 0 for groups of a single clock angle
+    """
     n_groups = turning.shape[0]
     sums = np.zeros((n_groups, 3))
     for i in range(clock.shape[0]):
@@ -61,9 +92,9 @@ def turn_of_normals(clock, lean, group, turning):
         k = group[i]
         x = (clock[i] - middle[k] + math.pi) % (2.0 * math.pi) - math.pi
         moments[k, 0] += x
-        moments[k, 1] += lean[i]
+        moments[k, 1] += normal_angle[i]
         moments[k, 2] += x * x
-        moments[k, 3] += x * lean[i]
+        moments[k, 3] += x * normal_angle[i]
     for k in range(n_groups):
         n = sums[k, 2]
         turning[k] = 0.0
@@ -75,11 +106,20 @@ def turn_of_normals(clock, lean, group, turning):
 
 
 @njit(cache=True, nogil=True)
-def off_oval(clock, residual, row, n_rows, n_sectors, least_arc, most):
-    """Distance of points from the oval section of their row; from the circle where none is told.
+def off_oval(clock, residual, row, n_rows, n_sectors, min_arc, max_amplitude):
+    """Return the distances of points from the oval section of their row.
 
-    An oval is told by the means of the sectors of three rows if they show more than
-    `least_arc`; it is the second harmonic only, up to the amplitude `most`.
+    An oval is the second harmonic of the means of the sectors of three rows. Where they show
+    too short an arc, or the harmonic is too large, distances are those from the circle.
+
+    Parameters
+    ----------
+    clock (n,) : clock angles, radians
+    residual (n,) : distances from the circle, metres
+    row (n,) : row of each point
+    n_rows, n_sectors : numbers of rows, and of sectors around the axis
+    min_arc : least arc, radians
+    max_amplitude : largest amplitude of the second harmonic, metres
     """
     count, total = np.zeros((n_rows, n_sectors)), np.zeros((n_rows, n_sectors))
     for i in range(clock.shape[0]):
@@ -111,12 +151,12 @@ def off_oval(clock, residual, row, n_rows, n_sectors, least_arc, most):
                 right[a] += terms[k, a] * mean
                 for b in range(a + 1):
                     normal[a, b] += terms[k, a] * terms[k, b]
-        if n_seen * (2.0 * math.pi / n_sectors) <= least_arc:
+        if n_seen * (2.0 * math.pi / n_sectors) <= min_arc:
             continue
         for a in range(5):
             normal[a, a] += 1e-6
         solve_in_place(normal, right)
-        if math.hypot(right[3], right[4]) < most:
+        if math.hypot(right[3], right[4]) < max_amplitude:
             second[r, 0], second[r, 1] = right[3], right[4]
     off = np.empty(clock.shape[0])
     for i in range(clock.shape[0]):
@@ -126,13 +166,27 @@ def off_oval(clock, residual, row, n_rows, n_sectors, least_arc, most):
 
 
 @njit(cache=True, nogil=True)
-def cover_rows(chainage, clock, residual, lean, length, radius, base, step, n_sectors, limits):
-    """Tell which steps of axis from `base` on are covered; see `find_extent`.
+def cover_rows(
+    chainage, clock, residual, normal_angle, length, radius, base, step, n_sectors, limits
+):
+    """Find the steps of an axis that are covered by points on its surface.
 
-    `limits` are: share of the usual arc, arc that is always enough, share of the usual arc
-    that is, furthest median from the surface, arc and amplitude of ovals and the share that
-    they leave, and the least turning. Returns the arc of each step, the covered steps, and
-    how many of them are in the proposed extent.
+    See `pipecore.elements.refinement.extent.find_extent`.
+
+    Parameters
+    ----------
+    chainage, clock, residual, normal_angle (n,) : metres, radians, metres and radians
+    length, radius : of the proposed element, metres
+    base, step : chainage where step 0 begins, and length of a step, metres
+    n_sectors : number of sectors around the axis
+    limits (8) : least arc, fraction of the usual one; arc that is enough, radians; fraction of
+      the usual arc that is enough; largest median distance, metres; least arc of an oval,
+      radians; its largest amplitude in radii; largest fraction of the distance that it leaves;
+      least turning of normals
+
+    Returns
+    -------
+    Arc of each step (radians), the covered steps, and how many of them lie within the length.
     """
     share, enough, share_enough, max_off, oval_arc, max_oval, oval_share, min_turning = limits
     row = rows_of(chainage, base, step)
@@ -162,7 +216,7 @@ def cover_rows(chainage, clock, residual, lean, length, radius, base, step, n_se
             if of_oval[k] < oval_share * off[k]:
                 off[k] = of_oval[k]
     turning = np.empty(n_rows)
-    turn_of_normals(clock, lean, row, turning)
+    normal_turning(clock, normal_angle, row, turning)
     least_arc = max(share * usual_arc, min(enough, share_enough * usual_arc))
     n = n_core = 0
     for k in range(n_rows):
@@ -175,7 +229,15 @@ def cover_rows(chainage, clock, residual, lean, length, radius, base, step, n_se
 
 @njit(cache=True, nogil=True)
 def arcs_in_gaps(chainage, clock, base, step, covered, n_sectors):
-    """Arc that points show between each covered step and the next one."""
+    """Return the arc that points show between each covered step and the next one, radians.
+
+    Parameters
+    ----------
+    chainage, clock (n,) : of points inside the surface, metres and radians
+    base, step : chainage where step 0 begins, and length of a step, metres
+    covered (c,) : covered steps, ascending
+    n_sectors : number of sectors around the axis
+    """
     first, n_rows = covered[0], covered[-1] + 1 - covered[0]
     seen = np.empty((n_rows, n_sectors), np.bool_)
     mark_sectors(rows_of(chainage, base, step) - first, clock, seen)
@@ -191,9 +253,20 @@ def arcs_in_gaps(chainage, clock, base, step, covered, n_sectors):
 
 @njit(cache=True, nogil=True)
 def best_part(covered, arcs_inside, base, step, length, longest_gap, most_arc):
-    """First and last place, in `covered`, of the part with most steps of the proposed extent.
+    """Find the unbroken part with most covered steps within the proposed length.
 
-    Parts end at gaps that are long, or in which much of an arc shows.
+    Parameters
+    ----------
+    covered (c,) : covered steps, ascending
+    arcs_inside (c - 1,) : arcs that show inside the surface between them, radians
+    base, step : chainage where step 0 begins, and length of a step, metres
+    length : of the proposed element, metres
+    longest_gap : a longer gap ends a part, metres
+    most_arc : a gap in which more arc shows inside the surface ends a part, radians
+
+    Returns
+    -------
+    First and last index in `covered`.
     """
     n = covered.shape[0]
     best, first, last, start, inside = -1, 0, 0, 0, 0
@@ -211,7 +284,14 @@ def best_part(covered, arcs_inside, base, step, length, longest_gap, most_arc):
 
 @njit(cache=True, nogil=True)
 def bounds_of(chainage, base, step, first, last):
-    """Least chainage of the points of one step and largest of those of another."""
+    """Return the least chainage of one step's points and the largest of another's, metres.
+
+    Parameters
+    ----------
+    chainage (n,) : metres
+    base, step : chainage where step 0 begins, and length of a step, metres
+    first, last : the two steps
+    """
     low, high = math.inf, -math.inf
     for c in chainage:
         k = math.floor((c - base) / step)
@@ -223,21 +303,31 @@ def bounds_of(chainage, base, step, first, last):
 
 
 @njit(cache=True, nogil=True)
-def points_between(own, chainage, clock, residual, low, high, clear, least):
-    """Points within an extent: index, clock and residual; and those clear of its ends.
+def points_between(inliers, chainage, clock, residual, low, high, end_margin, min_points):
+    """Select the points within an extent, and those away from its ends.
 
-    Where `least` or fewer are clear of the ends all are taken.
+    Parameters
+    ----------
+    inliers (n,) : indices of points on the surface
+    chainage, clock, residual (n,) : metres, radians, metres
+    low, high : the extent, metres
+    end_margin : distance from the ends, metres
+    min_points : all are taken where no more than this are away from the ends
+
+    Returns
+    -------
+    Indices, clock and residual of the points within, and indices of those away from the ends.
     """
-    n_most = own.shape[0]
-    index, core = np.empty(n_most, own.dtype), np.empty(n_most, own.dtype)
+    n_most = inliers.shape[0]
+    index, core = np.empty(n_most, inliers.dtype), np.empty(n_most, inliers.dtype)
     clocks, residuals = np.empty(n_most), np.empty(n_most)
     n = n_core = 0
     for i in range(n_most):
         if low <= chainage[i] <= high:
-            index[n], clocks[n], residuals[n] = own[i], clock[i], residual[i]
+            index[n], clocks[n], residuals[n] = inliers[i], clock[i], residual[i]
             n += 1
-            if low + clear <= chainage[i] <= high - clear:
-                core[n_core] = own[i]
+            if low + end_margin <= chainage[i] <= high - end_margin:
+                core[n_core] = inliers[i]
                 n_core += 1
-    chosen = core[:n_core] if n_core > least else index[:n]
+    chosen = core[:n_core] if n_core > min_points else index[:n]
     return index[:n], clocks[:n], residuals[:n], chosen

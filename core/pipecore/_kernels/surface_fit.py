@@ -1,15 +1,18 @@
 """Cylinders, cones, tori and spheres fitted robustly to points, without Python between.
 
-Surfaces and their parameters are those of `pipecore._kernels.surfaces`.
+Surfaces and their parameters are those of `pipecore._kernels.surface_models`.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from pipecore._kernels.circles import tukey_weight
 from pipecore._kernels.linear import mirror, solve_step
-from pipecore._kernels.surfaces import (
+from pipecore._kernels.surface_models import (
     CONE,
     CYLINDER,
     MOST_PARAMETERS,
@@ -17,6 +20,7 @@ from pipecore._kernels.surfaces import (
     move,
     n_parameters,
 )
+from pipecore.robust import MAD_TO_SD
 
 TUKEY = 4.685
 """Reach of Tukey's weights in standard deviations: 95 % as good as least squares on noise."""
@@ -29,19 +33,37 @@ FACING = 0.3
 """Least cosine to the beam of points that tell the noise along it."""
 
 
-@njit(cache=True, nogil=True)
-def tukey(residual, reach):
-    """Weight that falls to zero at `reach`."""
-    q = residual / reach
-    return (1.0 - q * q) ** 2 if abs(q) < 1.0 else 0.0
+class BeamNoise(NamedTuple):
+    """Noise along the laser's beam, as a quadrature over the normal distribution.
+
+    min_one_sided: length of the mean of the outward vectors from which a surface is seen from
+    one side and corrected; above 1 none is;
+    steps (k,): nodes, standard deviations;
+    shares (k,): their weights, of sum 1.
+    """
+
+    min_one_sided: float
+    steps: NDArray[np.float64]
+    shares: NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
 def line_equations(surface, xyz, reach, residuals, normal, right):
-    """Do as `weighted_normal_equations` for cylinders and cones, several times as fast.
+    """Write what `weighted_normal_equations` does for cylinders and cones, several times as fast.
 
-    Their derivatives are products of the chainage s, and of cosine and sine of the clock, so
-    that few sums are enough.
+    Their derivatives are products of the chainage s and of cosine and sine of the clock angle,
+    so that few sums are enough.
+
+    Parameters
+    ----------
+    surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    reach : of Tukey's weights, metres
+    residuals (n,), normal (p, p), right (p,) : filled
+
+    Returns
+    -------
+    Number of points within reach.
     """
     p = right.shape[0]
     x0, y0, z0 = surface[0], surface[1], surface[2]
@@ -100,7 +122,19 @@ def line_equations(surface, xyz, reach, residuals, normal, right):
 
 @njit(cache=True, nogil=True)
 def weighted_normal_equations(kind, surface, xyz, reach, residuals, normal, right):
-    """Write distances, Σ w jjᵀ (p, p) and Σ w j·residual (p,); return how many points count."""
+    """Write distances, Σ w jjᵀ and Σ w j·residual with Tukey's weights w.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    reach : of Tukey's weights, metres
+    residuals (n,), normal (p, p), right (p,) : filled
+
+    Returns
+    -------
+    Number of points within reach.
+    """
     if kind in (CYLINDER, CONE):
         return line_equations(surface, xyz, reach, residuals, normal, right)
     p = right.shape[0]
@@ -113,7 +147,7 @@ def weighted_normal_equations(kind, surface, xyz, reach, residuals, normal, righ
         residuals[i] = residual
         if abs(residual) < reach:
             n_used += 1
-            weight = tukey(residual, reach)
+            weight = tukey_weight(residual, reach)
             for k in range(p):
                 weighted = weight * row[k]
                 right[k] += weighted * residual
@@ -125,19 +159,33 @@ def weighted_normal_equations(kind, surface, xyz, reach, residuals, normal, righ
 
 @njit(cache=True, nogil=True)
 def spread_within(residuals, reach):
-    """Standard deviation from the median absolute residual of those within `reach`."""
+    """Return the standard deviation from the median absolute residual of those within reach.
+
+    Parameters
+    ----------
+    residuals (n,) : metres
+    reach : metres
+    """
     found = np.empty(residuals.shape[0])
     n = 0
     for residual in residuals:
         if abs(residual) < reach:
             found[n] = abs(residual)
             n += 1
-    return 1.4826 * np.median(found[:n]) if n > 0 else math.nan
+    return MAD_TO_SD * np.median(found[:n]) if n > 0 else math.nan
 
 
 @njit(cache=True, nogil=True)
 def moves_less(kind, surface, xyz, step, limit):
-    """Whether a step changes the distance of every point by less than `limit`."""
+    """Return whether a step changes the distance of every point by less than a limit.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    step (p,) : of the parameters
+    limit : metres
+    """
     row = np.empty(MOST_PARAMETERS)
     for i in range(xyz.shape[0]):
         at_point(kind, surface, xyz[i, 0], xyz[i, 1], xyz[i, 2], row)
@@ -151,10 +199,17 @@ def moves_less(kind, surface, xyz, step, limit):
 
 @njit(cache=True, nogil=True)
 def fit_robustly(kind, surface, xyz, scale, n_iterations, converged):
-    """Move a surface onto points by Gauss-Newton with Tukey's weights, in place.
+    """Fit a surface by Gauss-Newton with Tukey's weights, in place; return the last scale.
 
-    It ends when no point's distance changes by more than `converged`, nor the scale by much.
-    Returns the last scale; nan where the points do not carry the surface.
+    nan where the points do not define the surface.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`; changed
+    xyz (n, 3) : points, metres
+    scale : standard deviation to begin with, metres
+    n_iterations : most iterations
+    converged : change of distances below which it ends, metres
     """
     p = n_parameters(kind)
     normal, right, step = np.empty((p, p)), np.empty(p), np.empty(p)
@@ -179,10 +234,19 @@ def fit_robustly(kind, surface, xyz, scale, n_iterations, converged):
 
 @njit(cache=True, nogil=True)
 def judge_fit(kind, surface, xyz, reach, information, scatter, beam):
-    """What the points within `reach` tell of a fitted surface.
+    """Write the matrices of Huber's covariance of an M-estimator, and the mean outward vector.
 
-    Writes Huber's information matrix of an M-estimator and the scatter of its gradient
-    (p, p), and the mean of the outward vectors (3,). Returns the points' number and spread.
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    reach : of Tukey's weights, metres
+    information, scatter (p, p) : filled with the mean slope times Σjjᵀ, and Σ(wr)²jjᵀ
+    beam (3,) : filled
+
+    Returns
+    -------
+    Number of points within reach, and their robust standard deviation, metres.
     """
     p = information.shape[0]
     row = np.empty(MOST_PARAMETERS)
@@ -199,7 +263,7 @@ def judge_fit(kind, surface, xyz, reach, information, scatter, beam):
             n += 1
             ratio = (residual / reach) ** 2
             slope += (1.0 - ratio) * (1.0 - 5.0 * ratio)
-            pull = (tukey(residual, reach) * residual) ** 2
+            pull = (tukey_weight(residual, reach) * residual) ** 2
             beam[0] += ox
             beam[1] += oy
             beam[2] += oz
@@ -221,7 +285,15 @@ def judge_fit(kind, surface, xyz, reach, information, scatter, beam):
 
 @njit(cache=True, nogil=True)
 def noise_along(kind, surface, xyz, reach, beam):
-    """Standard deviation along a beam of the points within `reach` that face it."""
+    """Return the standard deviation along a beam of the points that face it, metres.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    reach : largest distance from the surface, metres
+    beam (3,) : unit vector
+    """
     row = np.empty(MOST_PARAMETERS)
     moved = np.empty(xyz.shape[0])
     n = 0
@@ -231,15 +303,23 @@ def noise_along(kind, surface, xyz, reach, beam):
         if abs(residual) < reach and facing > FACING:
             moved[n] = abs(residual / facing)
             n += 1
-    return 1.4826 * np.median(moved[:n]) if n > 0 else 0.0
+    return MAD_TO_SD * np.median(moved[:n]) if n > 0 else 0.0
 
 
 @njit(cache=True, nogil=True)
 def pull_along(kind, surface, xyz, reach, beam, steps, shares, pull):
-    """Write the mean of Σ w j·residual for points within `reach` that are moved along a beam.
+    """Write the mean of Σ w j·residual for points moved along a beam.
 
-    They are moved from where they would lie on the surface, by `steps` (metres) that are
-    as probable as `shares`.
+    They are moved from where they would lie on the surface.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`
+    xyz (n, 3) : points, metres
+    reach : of Tukey's weights, metres
+    beam (3,) : unit vector
+    steps, shares (k,) : movements, metres, and their probabilities
+    pull (p,) : filled
     """
     p = pull.shape[0]
     row = np.empty(MOST_PARAMETERS)
@@ -256,22 +336,32 @@ def pull_along(kind, surface, xyz, reach, beam, steps, shares, pull):
                 kind, surface, x + t * beam[0], y + t * beam[1], z + t * beam[2], row
             )
             if abs(residual) < reach:
-                weighted = shares[k] * tukey(residual, reach) * residual
+                weighted = shares[k] * tukey_weight(residual, reach) * residual
                 for m in range(p):
                     pull[m] += weighted * row[m]
 
 
 @njit(cache=True, nogil=True)
-def take_off_pull(kind, surface, xyz, reach, facing, one_sided, steps, shares, inverse):
-    """Move a surface by what noise along the laser's beam has moved it."""
+def subtract_range_noise_bias(kind, surface, xyz, reach, facing, noise, inverse):
+    """Move a surface back by what noise along the laser's beam has moved it.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`; changed
+    xyz (n, 3) : points, metres
+    reach : of Tukey's weights, metres
+    facing (3,) : mean outward vector of the points
+    noise : BeamNoise
+    inverse (p, p) : inverse of the fit's information matrix
+    """
     p = inverse.shape[0]
     one_sidedness = math.sqrt(facing[0] ** 2 + facing[1] ** 2 + facing[2] ** 2)
-    if one_sidedness < one_sided:
+    if one_sidedness < noise.min_one_sided:
         return
     beam = facing / one_sidedness
-    noise = noise_along(kind, surface, xyz, reach, beam)
+    sd = noise_along(kind, surface, xyz, reach, beam)
     pull, step = np.zeros(p), np.zeros(p)
-    pull_along(kind, surface, xyz, reach, beam, steps * noise, shares, pull)
+    pull_along(kind, surface, xyz, reach, beam, noise.steps * sd, noise.shares, pull)
     for k in range(p):
         for m in range(p):
             step[k] += inverse[k, m] * pull[m]
@@ -279,13 +369,23 @@ def take_off_pull(kind, surface, xyz, reach, facing, one_sided, steps, shares, i
 
 
 @njit(cache=True, nogil=True)
-def fit_surface(
-    kind, surface, xyz, scale, n_iterations, converged, one_sided, steps, shares, covariance
-):
+def fit_surface(kind, surface, xyz, scale, n_iterations, converged, noise, covariance):
     """Fit a surface to points, in place, and write its covariance.
 
-    Returns the number of points that count and their spread; 0 and nan where the points do
-    not carry the surface. With `one_sided` above 1 what noise along the beam does is left.
+    Parameters
+    ----------
+    kind, surface (14,) : see `surface_models`; changed
+    xyz (n, 3) : points, metres
+    scale : standard deviation to begin with, metres
+    n_iterations : most iterations
+    converged : change of distances below which it ends, metres
+    noise : BeamNoise
+    covariance (p, p) : filled; points need not all scatter alike
+
+    Returns
+    -------
+    Number of points that count, and their robust standard deviation, metres; 0 and nan where
+    the points do not define the surface.
     """
     p = n_parameters(kind)
     scale = fit_robustly(kind, surface, xyz, scale, n_iterations, converged)
@@ -298,7 +398,7 @@ def fit_surface(
     if n < 3 * p or not np.all(np.isfinite(information)):
         return 0, math.nan
     inverse = np.linalg.pinv(information)
-    take_off_pull(kind, surface, xyz, reach, beam, one_sided, steps, shares, inverse)
+    subtract_range_noise_bias(kind, surface, xyz, reach, beam, noise, inverse)
     for k in range(p):
         for m in range(p):
             total = 0.0

@@ -7,18 +7,67 @@ of a row from `starts[row]` on, each with its column, height and weight.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from pipecore._kernels.linear import factorise_band, solve_by_band
+from pipecore.robust import MAD_TO_SD
+
+
+class ContourTerms(NamedTuple):
+    """Values of splines and harmonics at the cells of a map (rows, columns).
+
+    first (rows,): first of the four splines that reach each row;
+    basis (rows, 4): their values there;
+    harmonics (columns, terms): values of 1, cos θ, sin θ … at each column.
+    """
+
+    first: NDArray[np.int64]
+    basis: NDArray[np.float64]
+    harmonics: NDArray[np.float64]
+
+
+class MapCells(NamedTuple):
+    """The cells of a map that are used, row by row.
+
+    starts (rows + 1,): where each row begins;
+    column (n,): column of each cell;
+    height (n,): mean height, metres;
+    weight (n,): inverse variance of it, 1/metres².
+    """
+
+    starts: NDArray[np.int64]
+    column: NDArray[np.int32]
+    height: NDArray[np.float64]
+    weight: NDArray[np.float64]
+
+
+class RobustLoss(NamedTuple):
+    """Reweighting of a robust fit.
+
+    cauchy, tukey: reach of Cauchy's and of Tukey's weights, standard deviations;
+    n_rounds: most solutions with either;
+    tolerance: change of a coefficient below which a fit has converged, metres.
+    """
+
+    cauchy: float
+    tukey: float
+    n_rounds: int
+    tolerance: float
 
 
 @njit(cache=True, nogil=True)
 def list_cells(height, variance, used, floor):
-    """List the cells of rows that are used whose height and variance are finite.
+    """Return the cells of a map that are used and finite, as `MapCells`.
 
-    Returns where rows start, and columns, heights and weights 1 / (variance + floor²).
+    Parameters
+    ----------
+    height, variance (rows, columns) : mean height, metres, and its variance, metres²
+    used (rows,) : rows that are used
+    floor : standard deviation added to every cell, metres
     """
     n_rows, n_columns = height.shape
     starts = np.zeros(n_rows + 1, np.int64)
@@ -33,12 +82,23 @@ def list_cells(height, variance, used, floor):
                     weights[n] = 1.0 / (variance[r, c] + floor * floor)
                     n += 1
         starts[r + 1] = n
-    return starts, column[:n], values[:n], weights[:n]
+    return MapCells(starts, column[:n], values[:n], weights[:n])
 
 
 @njit(cache=True, nogil=True)
-def normal_equations(first, basis, harmonics, starts, column, height, weight, band, right):
-    """Add Σ w aaᵀ to a lower band, band[j, i - j], and write Σ w a·height to `right`."""
+def normal_equations(terms, cells, weight, band, right):
+    """Add Σ w aaᵀ of the design's rows a to a lower band, and write Σ w a·height.
+
+    Parameters
+    ----------
+    terms : ContourTerms
+    cells : MapCells
+    weight (n,) : w of each cell, 1/metres²
+    band (p, 4 · terms) : added to, band[j, i - j]
+    right (p,) : filled
+    """
+    first, basis, harmonics = terms.first, terms.basis, terms.harmonics
+    starts, column, height = cells.starts, cells.column, cells.height
     n_columns, n_terms = harmonics.shape
     n_pairs = n_terms * (n_terms + 1) // 2
     pairs = np.empty((n_columns, n_pairs))
@@ -81,8 +141,16 @@ def normal_equations(first, basis, harmonics, starts, column, height, weight, ba
 
 
 @njit(cache=True, nogil=True)
-def heights(first, basis, harmonics, coefficients, table):
-    """Write the contour's height per cell."""
+def heights(terms, coefficients, table):
+    """Write the contour's height per cell, metres.
+
+    Parameters
+    ----------
+    terms : ContourTerms
+    coefficients (splines, terms) : metres
+    table (rows, columns) : filled
+    """
+    first, basis, harmonics = terms.first, terms.basis, terms.harmonics
     n_terms = harmonics.shape[1]
     for r in range(table.shape[0]):
         table[r, :] = 0.0
@@ -95,32 +163,49 @@ def heights(first, basis, harmonics, coefficients, table):
 
 
 @njit(cache=True, nogil=True)
-def scaled_residuals(
-    first, basis, harmonics, coefficients, starts, column, height, weight, residuals
-):
-    """Write residuals in units of their noise; return their robust spread, at least 1."""
+def scaled_residuals(terms, coefficients, cells, residuals):
+    """Write residuals in units of their noise; return their robust standard deviation, at least 1.
+
+    Parameters
+    ----------
+    terms : ContourTerms
+    coefficients (splines, terms) : metres
+    cells : MapCells
+    residuals (n,) : filled
+    """
+    first, basis, harmonics = terms.first, terms.basis, terms.harmonics
+    starts, column, height, weight = cells.starts, cells.column, cells.height, cells.weight
     n_terms, n = harmonics.shape[1], height.shape[0]
-    terms = np.empty(n_terms)
+    at_row = np.empty(n_terms)
     found, n_small = np.empty(n), 0
     for r in range(first.shape[0]):
         for k in range(n_terms):
-            terms[k] = 0.0
+            at_row[k] = 0.0
             for a in range(4):
-                terms[k] += basis[r, a] * coefficients[first[r] + a, k]
+                at_row[k] += basis[r, a] * coefficients[first[r] + a, k]
         for i in range(starts[r], starts[r + 1]):
             fitted = 0.0
             for k in range(n_terms):
-                fitted += terms[k] * harmonics[column[i], k]
+                fitted += at_row[k] * harmonics[column[i], k]
             residuals[i] = (height[i] - fitted) * math.sqrt(weight[i])
             found[i] = abs(residuals[i])
-            n_small += found[i] <= 1.0 / 1.4826
+            n_small += found[i] <= 1.0 / MAD_TO_SD
     # Their median is sought only where it is not below one for sure.
-    return max(1.4826 * np.median(found), 1.0) if n_small <= n // 2 and n > 0 else 1.0
+    return max(MAD_TO_SD * np.median(found), 1.0) if n_small <= n // 2 and n > 0 else 1.0
 
 
 @njit(cache=True, nogil=True)
 def reweight(residuals, weight, spread, cauchy, tukey, weights):
-    """Write `weight` times the loss's weights: Cauchy's where `cauchy` is positive, or Tukey's."""
+    """Write weights times those of a robust loss: Cauchy's where its reach is positive, or Tukey's.
+
+    Parameters
+    ----------
+    residuals (n,) : in units of their noise
+    weight (n,) : before
+    spread : robust standard deviation of the residuals
+    cauchy, tukey : reach of either loss, standard deviations
+    weights (n,) : filled
+    """
     for i in range(weight.shape[0]):
         t = residuals[i] / spread
         if cauchy > 0.0:
@@ -130,42 +215,50 @@ def reweight(residuals, weight, spread, cauchy, tukey, weights):
 
 
 @njit(cache=True, nogil=True)
-def fit_robustly(
-    first, basis, harmonics, starts, column, height, weight, prior, cauchy, tukey, n_rounds,
-    tolerance, band, coefficients,
-):  # fmt: skip
-    """Fit by Cauchy's weights, then by Tukey's, at most `n_rounds` of each.
+def fit_robustly(terms, cells, prior, loss, band, coefficients):
+    """Fit a contour with Cauchy's weights, then with Tukey's; return how many systems it solved.
 
-    A loss has done its part where no coefficient changes by more than `tolerance`. Writes the
-    coefficients, and the factor of their normal equations to `band`; returns how often it solved.
+    Parameters
+    ----------
+    terms : ContourTerms
+    cells : MapCells
+    prior (p, 4 · terms) : lower band of the prior's inverse covariance
+    loss : RobustLoss
+    band (p, 4 · terms) : filled with the Cholesky factor of the last normal equations
+    coefficients (splines, terms) : filled, metres
     """
-    own, residuals = weight.copy(), np.empty(weight.shape[0])
+    weight, residuals = cells.weight.copy(), np.empty(cells.weight.shape[0])
     solution = coefficients.reshape(-1)
     before = np.empty(solution.shape[0])
     n_solved = 0
-    for loss in range(3):
+    for stage in range(3):
         # Plain first, which is one round.
-        for _ in range(n_rounds if loss else 1):
-            if loss:
-                spread = scaled_residuals(
-                    first, basis, harmonics, coefficients, starts, column, height, weight, residuals
-                )
-                bend = cauchy if loss == 1 else 0.0
-                reweight(residuals, weight, spread, bend, tukey, own)
+        for _ in range(loss.n_rounds if stage else 1):
+            if stage:
+                spread = scaled_residuals(terms, coefficients, cells, residuals)
+                cauchy = loss.cauchy if stage == 1 else 0.0
+                reweight(residuals, cells.weight, spread, cauchy, loss.tukey, weight)
             before[:] = solution
             band[:, :] = prior
-            normal_equations(first, basis, harmonics, starts, column, height, own, band, solution)
+            normal_equations(terms, cells, weight, band, solution)
             factorise_band(band)
             solve_by_band(band, solution)
             n_solved += 1
-            if loss and np.abs(solution - before).max() <= tolerance:
+            if stage and np.abs(solution - before).max() <= loss.tolerance:
                 break
     return n_solved
 
 
 @njit(cache=True, nogil=True)
 def row_covariances(first, basis, covariance, table):
-    """Write the covariance of the terms at every row (rows, terms, terms)."""
+    """Write the covariance of the terms at every row.
+
+    Parameters
+    ----------
+    first (rows,), basis (rows, 4) : as in `ContourTerms`
+    covariance (splines, terms, splines, terms) : of the coefficients, metres²
+    table (rows, terms, terms) : filled
+    """
     n_terms = table.shape[1]
     for r in range(table.shape[0]):
         for k in range(n_terms):
@@ -181,7 +274,14 @@ def row_covariances(first, basis, covariance, table):
 
 @njit(cache=True, nogil=True)
 def standard_deviations(harmonics, covariance, table):
-    """Write the standard deviation of a height per cell from the covariance of each row's terms."""
+    """Write the standard deviation of the contour's height per cell, metres.
+
+    Parameters
+    ----------
+    harmonics (columns, terms) : values of the terms at each column
+    covariance (rows, terms, terms) : of the terms at each row, metres²
+    table (rows, columns) : filled
+    """
     n_terms = harmonics.shape[1]
     for r in range(table.shape[0]):
         for c in range(table.shape[1]):

@@ -4,11 +4,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore._kernels import ellipses as kernels
+from pipecore._kernels import circles, curve_splitting, oblique_cuts
+from pipecore._kernels.curve_fits import CurveFits, CurveLimits, fit_curves
+from pipecore._kernels.curve_splitting import SplitLimits
 from tests.core.shapes import random_rotation, unit_rows
 
 # Random numbers wrap around on purpose, which plain numpy warns of.
 pytestmark = [pytest.mark.kernels, pytest.mark.filterwarnings("ignore:overflow encountered")]
+
+SPLIT = SplitLimits(
+    min_points=6, tolerance=0.004, max_gap=0.03, cos_radial=0.9, min_cos_tilt=np.cos(np.pi / 4),
+    max_radius=5.0, n_trials=60, max_pieces=6,
+)  # fmt: skip
 
 
 def axis_of(tilt_deg, azimuth_deg):
@@ -30,8 +37,9 @@ def cut_cylinder(axis, centre, r, angles):
 def fit(*curves, tolerance=0.004, max_gap=0.04):
     uv, normals = (np.concatenate(c) for c in zip(*curves, strict=True))
     starts = np.cumsum([0, *(len(c[0]) for c in curves)])
-    fits = np.empty((len(curves), kernels.N_FIT_COLUMNS))
-    kernels.fit_curves(uv, normals, starts, 0, len(curves), tolerance, max_gap, 0.0, np.inf, fits)
+    fits = CurveFits.empty(len(curves))
+    limits = CurveLimits(tolerance, max_gap, 0.0, np.inf)
+    fit_curves(uv, normals, starts, 0, len(curves), limits, fits)
     return fits
 
 
@@ -39,29 +47,29 @@ def test_that_curves_with_a_steep_or_hardly_defined_axis_are_none(rng):
     angles = np.linspace(0, np.pi, 40)
     uv, normals = cut_cylinder(axis_of(30.0, 10.0), np.zeros(2), 0.1, angles)
     for limits, is_one in (((0.85, np.inf), True), ((0.88, np.inf), False), ((0.0, -1.0), False)):
-        fits = np.empty((1, kernels.N_FIT_COLUMNS))
+        fits = CurveFits.empty(1)
         starts = np.array([0, len(uv)])
-        kernels.fit_curves(uv, normals, starts, 0, 1, 0.002, 0.05, *limits, fits)
-        assert np.isfinite(fits).all() == is_one
-        assert np.isnan(fits).all() != is_one
+        fit_curves(uv, normals, starts, 0, 1, CurveLimits(0.002, 0.05, *limits), fits)
+        assert all(np.isfinite(column).all() == is_one for column in fits)
+        assert all(np.isnan(column).all() != is_one for column in fits)
 
 
 def test_that_the_common_axis_is_the_least_eigenvector_of_the_normals(rng):
     normals = unit_rows(rng.normal(size=(30, 3)) * [1.0, 0.6, 0.1]) @ random_rotation(rng)
     chosen = rng.random(30) < 0.7
-    u, v, d, l1, l2 = kernels.common_axis(normals, chosen)
+    u, v, d, l1, l2 = oblique_cuts.common_axis(normals, chosen)
     values, vectors = np.linalg.eigh(normals[chosen].T @ normals[chosen] / chosen.sum())
     assert d >= 0
     assert abs(np.array([u, v, d]) @ vectors[:, 0]) == pytest.approx(1.0, abs=1e-9)
     assert_allclose([l1, l2], values[:2], atol=1e-12)
-    assert np.isnan(kernels.common_axis(normals, np.arange(30) < 2)).all()
+    assert np.isnan(oblique_cuts.common_axis(normals, np.arange(30) < 2)).all()
 
 
 def test_that_looking_along_an_axis_is_a_projection(rng):
     axis = axis_of(rng.uniform(0, 60), rng.uniform(0, 360))
     uv, normals = rng.normal(size=(10, 2)), unit_rows(rng.normal(size=(10, 3)))
     x, y, mx, my = np.empty((4, 10))
-    tu, tv = kernels.look_along(uv, normals, *axis, x, y, mx, my)
+    tu, tv = oblique_cuts.project_along_axis(uv, normals, *axis, x, y, mx, my)
     # The view's base: across the tilt, and towards it.
     across = np.array([-tv, tu, 0.0])
     towards = np.cross(across, axis)
@@ -78,18 +86,18 @@ def test_that_an_exact_cut_gives_back_its_cylinder(rng, tilt_deg, arc_deg):
     r, centre = rng.uniform(0.02, 0.5), rng.uniform(-5, 5, 2)
     step = np.radians(arc_deg) / 60
     angles = rng.uniform(0, 6) + step * np.arange(60)
-    (row,) = fit(cut_cylinder(axis, centre, r, angles), max_gap=1.5 * step * r)
-    assert_allclose(row[:2], centre, atol=1e-8)
-    assert_allclose(row[2:5], axis, atol=1e-7)
-    assert row[5] == pytest.approx(r, abs=1e-8)
-    assert row[6] < 1e-8
+    found = fit(cut_cylinder(axis, centre, r, angles), max_gap=1.5 * step * r).rows(0)
+    assert_allclose(found.centre, centre, atol=1e-8)
+    assert_allclose(found.axis, axis, atol=1e-7)
+    assert found.radius == pytest.approx(r, abs=1e-8)
+    assert found.rms < 1e-8
     seen = 360.0 if arc_deg == 360.0 else np.degrees(59 * step)
-    assert np.degrees(row[7]) == pytest.approx(seen, abs=1e-4)
-    assert row[8] == 60
-    assert row[9] == 1.0
+    assert np.degrees(found.arc) == pytest.approx(seen, abs=1e-4)
+    assert found.n_points == 60
+    assert found.radial_share == 1.0
     # On a cylinder the normals of a cut meet on its axis, abreast of the cut's middle.
-    meeting = row[10:13] - [*centre, 0.0]
-    if np.isfinite(row[10]):
+    meeting = found.meeting_point - [*centre, 0.0]
+    if np.isfinite(meeting[0]):
         assert np.linalg.norm(np.cross(meeting, axis)) < 1e-5
 
 
@@ -104,9 +112,9 @@ def test_that_the_normals_of_a_cut_sphere_meet_in_its_centre(rng):
         rim = np.column_stack([uv - centre, np.full(40, h)])
         curves.append((uv, rim / big_r))
     fits = fit(*curves)
-    assert_allclose(fits[:, 10:12], np.tile(centre, (3, 1)), atol=1e-8)
-    assert_allclose(fits[:, 12], -heights, atol=1e-8)
-    assert_allclose(fits[:, 13], big_r, atol=1e-8)
+    assert_allclose(fits.meeting_point[:, :2], np.tile(centre, (3, 1)), atol=1e-8)
+    assert_allclose(fits.meeting_point[:, 2], -heights, atol=1e-8)
+    assert_allclose(fits.meeting_distance, big_r, atol=1e-8)
 
 
 def test_that_too_few_points_or_parallel_normals_give_no_fit(rng):
@@ -116,7 +124,7 @@ def test_that_too_few_points_or_parallel_normals_give_no_fit(rng):
         cut_cylinder(axis_of(10, 0), np.zeros(2), 0.1, angles),
         (wall, np.tile([0.0, 1.0, 0.0], (20, 1))),
     )
-    assert np.isnan(fits).all()
+    assert all(np.isnan(column).all() for column in fits)
 
 
 def test_that_the_covered_arc_is_all_but_the_wide_gaps(rng):
@@ -126,7 +134,7 @@ def test_that_the_covered_arc_is_all_but_the_wide_gaps(rng):
         following = np.append(angles[1:], angles[0] + 2 * np.pi)
         gaps = following - angles
         expected = gaps[gaps <= max_gap].sum()
-        assert kernels.covered_arc(angles, max_gap) == pytest.approx(expected, abs=1e-9)
+        assert circles.covered_arc(angles, max_gap) == pytest.approx(expected, abs=1e-9)
 
 
 def test_that_a_curve_of_two_pipes_is_split_into_its_pipes_and_a_single_one_left_whole(rng):
@@ -139,10 +147,7 @@ def test_that_a_curve_of_two_pipes_is_split_into_its_pipes_and_a_single_one_left
     uv = np.concatenate([both[0], small[0]])
     normals = np.concatenate([both[1], small[1]])
     piece = np.zeros(120, np.int64)
-    kernels.split_curves(
-        uv, normals, np.array([0, 80, 120]), 0, 2, 6, 0.004, 0.03, 0.9,
-        np.cos(np.pi / 4), 5.0, 60, 6, piece,
-    )  # fmt: skip
+    curve_splitting.split_curves(uv, normals, np.array([0, 80, 120]), 0, 2, SPLIT, piece)
     assert (piece[80:] == 0).all()
     labels = [piece[:80][origin == k] for k in (0, 1)]
     winners = [np.bincount(label).argmax() for label in labels]
@@ -160,8 +165,8 @@ def test_that_the_best_circle_has_most_points_and_only_free_ones(rng):
     inliers = np.empty(40, np.bool_)
 
     def best(free):
-        return kernels.best_circle(
-            uv, normals, free, 0.003, 0.9, np.cos(np.pi / 4), 5.0, 60, 7, inliers
+        return curve_splitting.best_circle(
+            uv, normals, free, SPLIT._replace(tolerance=0.003), 7, inliers
         )
 
     free = np.ones(40, np.bool_)
@@ -185,11 +190,11 @@ def test_that_a_flat_curve_has_no_pair_that_tells_an_axis(rng, spread_deg):
     # What is not free does not count.
     normals[~free] = unit_rows(rng.normal(size=(n, 3)))[~free]
     cos = np.abs(normals[free] @ normals[free].T)
-    is_flat = kernels.is_flat(normals, free)
+    is_flat = curve_splitting.is_flat(normals, free)
     assert is_flat == (spread_deg < 8.0) or spread_deg == 9.9
     if is_flat:
-        assert cos.min() >= kernels.MIN_PAIR_COS
-    _, i, j = kernels.pick_pair(*normals[free].T.copy(), np.uint64(7))
+        assert cos.min() >= curve_splitting.MIN_PAIR_COS
+    _, i, j = curve_splitting.pick_pair(*normals[free].T.copy(), np.uint64(7))
     assert not is_flat or (i, j) == (-1, -1)
 
 
@@ -200,15 +205,18 @@ def test_that_the_turn_on_a_circle_counts_points_that_lie_on_it_and_face_its_cen
     uv[::5] += 0.03
     normals[::7] = unit_rows(rng.normal(size=normals[::7].shape))
     x, y, mx, my = (np.empty(80) for _ in range(4))
-    tu, tv = kernels.look_along(uv, normals, *axis, x, y, mx, my)
+    tu, tv = oblique_cuts.project_along_axis(uv, normals, *axis, x, y, mx, my)
     cx, cy = x[1] - r * mx[1], y[1] - r * my[1]
     is_on = np.array(
-        [kernels.fits_circle(*row, cx, cy, r, 0.004, 0.9) for row in zip(x, y, mx, my, strict=True)]
+        [
+            oblique_cuts.fits_circle(*row, cx, cy, r, 0.004, 0.9)
+            for row in zip(x, y, mx, my, strict=True)
+        ]
     )
     assert 20 < is_on.sum() < 70
     theta = np.arctan2(y - cy, x - cx)[is_on]
     expected = len(theta) - abs(np.exp(2j * theta).sum())
-    turn = kernels.turn_on_circle(
+    turn = curve_splitting.turn_on_circle(
         *(column.astype(np.float32) for column in (*uv.T, *normals.T)),
         tu, tv, axis[2], np.hypot(*axis[:2]), cx, cy, r, 0.004, 0.9,
     )  # fmt: skip

@@ -1,25 +1,96 @@
-"""Points around an axis or a place, from cells of two sizes.
-
-A grid is the lower corner and the edge of its coarse cells, their numbers along y and z, a hash
-table from the numbers of coarse cells to their ids, and the fine cells within each coarse one:
-those from `cell_starts[id]` to `cell_starts[id + 1]`, with their middles and half a diagonal.
-A fine cell's points are `members` from `starts[cell]` to `starts[cell + 1]`.
-"""
+"""Search for the points around an axis or a place, in cells of two sizes."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from pipecore._kernels.axes import across_axis, polar
 from pipecore._kernels.grouping import argsort_keys
-from pipecore._kernels.surfaces import MOST_PARAMETERS, at_point
-from pipecore._kernels.voxels import EMPTY, slot_of
+from pipecore._kernels.pipe_coordinates import across_axis, polar
+from pipecore._kernels.surface_models import MOST_PARAMETERS, at_point
+from pipecore._kernels.voxel_hash import EMPTY, HashTable, slot_of
+
+
+class PointCells(NamedTuple):
+    """Points in fine cubic cells, which lie within coarse ones.
+
+    low (3,): lower corner of the coarse cells, metres;
+    edge: of a coarse cell, metres;
+    n_y, n_z: numbers of coarse cells along y and z;
+    table: from the numbers of coarse cells to their ids;
+    cell_starts (c + 1,): where the fine cells of each coarse one begin;
+    middles (m, 3): of the fine cells, metres;
+    half_cell: half a fine cell's diagonal, metres;
+    members (n,): the points, fine cell by fine cell;
+    starts (m + 1,): where those of each begin.
+    """
+
+    low: NDArray[np.float64]
+    edge: float
+    n_y: int
+    n_z: int
+    table: HashTable
+    cell_starts: NDArray[np.int64]
+    middles: NDArray[np.float64]
+    half_cell: float
+    members: NDArray[np.int32]
+    starts: NDArray[np.int64]
+
+
+class Tube(NamedTuple):
+    """The space between two distances from an axis and two chainages, metres.
+
+    axis (17,): see `pipe_coordinates`;
+    inner, outer: distances from it;
+    begin, end: chainages.
+    """
+
+    axis: NDArray[np.float64]
+    inner: float
+    outer: float
+    begin: float
+    end: float
+
+
+class OrientedPoints(NamedTuple):
+    """Points with normals.
+
+    xyz, normals (n, 3): places, metres, and unit normals of either sign, nan where not known;
+    is_free (n,): points that may be found.
+    """
+
+    xyz: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    is_free: NDArray[np.bool_]
+
+
+class Target(NamedTuple):
+    """A surface that points are looked for on.
+
+    kind, surface (14,): see `surface_models`;
+    band: largest distance of points on it, metres;
+    depth: least distance of points inside it, metres;
+    min_cos: least cosine between a point's normal and the surface's.
+    """
+
+    kind: int
+    surface: NDArray[np.float64]
+    band: float
+    depth: float
+    min_cos: float
 
 
 @njit(cache=True, nogil=True)
 def place_on_axis(axis, chainage):
-    """The point of an axis at a chainage."""
+    """Return the point of an axis at a chainage, metres.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    chainage : metres
+    """
     bend = axis[12]
     if bend == 0.0:
         return (
@@ -37,7 +108,14 @@ def place_on_axis(axis, chainage):
 
 @njit(cache=True, nogil=True)
 def appended(items, n, item):
-    """A list with room: `items` with `item` at n, in an array twice as long where it is full."""
+    """Return an array with an item written at n, twice as long where it was full.
+
+    Parameters
+    ----------
+    items (m,) : array with n items
+    n : number of items
+    item : of the array's type
+    """
     if n == items.shape[0]:
         longer = np.empty(2 * n, items.dtype)
         longer[:n] = items
@@ -48,7 +126,13 @@ def appended(items, n, item):
 
 @njit(cache=True, nogil=True)
 def distance_from_axis(axis, x, y, z):
-    """Distance of a point from a line or a full circle."""
+    """Return the distance of a point from an unbounded line or a full circle, metres.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    x, y, z : metres
+    """
     px, py, pz = x - axis[0], y - axis[1], z - axis[2]
     along = px * axis[3] + py * axis[4] + pz * axis[5]
     across = math.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))
@@ -59,15 +143,24 @@ def distance_from_axis(axis, x, y, z):
 
 
 @njit(cache=True, nogil=True)
-def cells_around(
-    low, edge, n_y, n_z, table_keys, table_ids, cell_starts, middles, half_cell,
-    axis, inner, outer, begin, end,
-):  # fmt: skip
-    """Fine cells that may hold points between two distances from an axis.
+def cells_around(grid, tube):
+    """Find the fine cells that may hold points of a tube.
 
-    The axis is walked from the chainage `begin` to `end` in steps; each coarse cell is taken
-    at the step that is nearest to it.
+    The axis is walked in steps; each coarse cell is taken at the step nearest to it.
+
+    Parameters
+    ----------
+    grid : PointCells
+    tube : Tube
+
+    Returns
+    -------
+    Indices of fine cells.
     """
+    low, edge, n_y, n_z = grid.low, grid.edge, grid.n_y, grid.n_z
+    table_keys, table_ids = grid.table.keys, grid.table.ids
+    cell_starts, middles, half_cell = grid.cell_starts, grid.middles, grid.half_cell
+    axis, inner, outer, begin, end = tube.axis, tube.inner, tube.outer, tube.begin, tube.end
     mask = np.int64(table_keys.shape[0] - 1)
     half_coarse = 0.5 * math.sqrt(3.0) * edge
     length = end - begin
@@ -110,11 +203,22 @@ def cells_around(
 
 
 @njit(cache=True, nogil=True)
-def cells_in_shell(
-    low, edge, n_y, n_z, table_keys, table_ids, cell_starts, middles, half_cell,
-    place, inner, outer,
-):  # fmt: skip
-    """Fine cells that may hold points between two distances from a place."""
+def cells_in_shell(grid, place, inner, outer):
+    """Find the fine cells that may hold points between two distances from a place.
+
+    Parameters
+    ----------
+    grid : PointCells
+    place (3,) : metres
+    inner, outer : distances, metres
+
+    Returns
+    -------
+    Indices of fine cells.
+    """
+    low, edge, n_y, n_z = grid.low, grid.edge, grid.n_y, grid.n_z
+    table_keys, table_ids = grid.table.keys, grid.table.ids
+    cell_starts, middles, half_cell = grid.cell_starts, grid.middles, grid.half_cell
     mask = np.int64(table_keys.shape[0] - 1)
     half_coarse = 0.5 * math.sqrt(3.0) * edge
     px, py, pz = place[0], place[1], place[2]
@@ -149,8 +253,18 @@ def cells_in_shell(
 
 
 @njit(cache=True, nogil=True)
-def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
-    """Points of some cells between two distances from an axis and not beyond its ends."""
+def points_around(xyz, grid, cells, tube):
+    """Find the points of some cells that lie in a tube, in ascending order.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    tube : Tube
+    """
+    members, starts, axis = grid.members, grid.starts, tube.axis
+    inner, outer = tube.inner, tube.outer
     n_most = 0
     for c in cells:
         n_most += starts[c + 1] - starts[c]
@@ -161,10 +275,7 @@ def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
             i = members[m]
             chainage, up, right = across_axis(axis, xyz[i, 0], xyz[i, 1], xyz[i, 2])
             rho2 = up * up + right * right
-            if (
-                inner * inner < rho2 < outer * outer
-                and -margin < chainage < axis[16] + margin
-            ):  # fmt: skip
+            if inner * inner < rho2 < outer * outer and tube.begin < chainage < tube.end:
                 found[n] = i
                 n += 1
     found = found[:n]
@@ -172,8 +283,18 @@ def points_around(xyz, members, starts, cells, axis, inner, outer, margin):
 
 
 @njit(cache=True, nogil=True)
-def points_in_ball(xyz, members, starts, cells, place, radius):
-    """Points of some cells within `radius` of a place, in order."""
+def points_in_ball(xyz, grid, cells, place, radius):
+    """Find the points of some cells within a distance of a place, in ascending order.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    place (3,) : metres
+    radius : metres
+    """
+    members, starts = grid.members, grid.starts
     found = np.empty(256, np.int64)
     n = 0
     for c in cells:
@@ -188,13 +309,25 @@ def points_in_ball(xyz, members, starts, cells, place, radius):
 
 
 @njit(cache=True, nogil=True)
-def points_on_sphere(
-    xyz, normals, is_free, members, starts, cells, centre, inner, outer, min_cos, stride
-):
-    """Free points of some cells between two distances from a place whose normals point to it.
+def points_on_sphere(points, grid, cells, centre, inner, outer, min_cos, stride):
+    """Find the free points of some cells in a shell whose normals point to its centre.
 
-    Of the cells' points only every `stride`-th is looked at.
+    Parameters
+    ----------
+    points : OrientedPoints
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    centre (3,) : metres
+    inner, outer : radii of the shell, metres
+    min_cos : least cosine between a normal and the direction to the centre
+    stride : only every so many-th point is examined
+
+    Returns
+    -------
+    Indices of the points, ascending.
     """
+    xyz, normals, is_free = points.xyz, points.normals, points.is_free
+    members, starts = grid.members, grid.starts
     found = np.empty(256, np.int64)
     n = 0
     for c in cells:
@@ -215,18 +348,26 @@ def points_on_sphere(
 
 
 @njit(cache=True, nogil=True)
-def points_on(
-    xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
-    kind, surface, band, min_cos, stride,
-):  # fmt: skip
-    """Free points of some cells that lie on a surface about an axis.
+def points_on(points, grid, cells, tube, target, stride):
+    """Find the free points of some cells that lie on a surface about an axis.
 
-    That are points within `band` of it, between two distances from the axis, with normals
-    like its own (cosine above `min_cos`); of the cells' points only every `stride`-th is
-    looked at. Returns, in the order of their indices, the indices
-    and (4, n): distance, chainage, clock, and the angle from the surface's normal to the
-    point's own towards increasing clock.
+    Parameters
+    ----------
+    points : OrientedPoints
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    tube : Tube
+    target : Target
+    stride : only every so many-th point is examined
+
+    Returns
+    -------
+    Indices of the points (m,), ascending, and (4, m): distance from the surface, chainage,
+    clock angle, and the angle from the surface's normal to the point's towards increasing
+    clock; metres and radians.
     """
+    xyz, normals, is_free = points.xyz, points.normals, points.is_free
+    members, starts, axis = grid.members, grid.starts, tube.axis
     found, table = np.empty(256, np.int64), np.empty((256, 4))
     row = np.empty(MOST_PARAMETERS)
     n = 0
@@ -236,15 +377,15 @@ def points_on(
             if not is_free[i]:
                 continue
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
-            if not abs(residual) < band:
+            residual, ox, oy, oz = at_point(target.kind, target.surface, x, y, z, row)
+            if not abs(residual) < target.band:
                 continue
             cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
-            if not abs(cosine) > min_cos:
+            if not abs(cosine) > target.min_cos:
                 continue
             chainage, up, right = across_axis(axis, x, y, z)
             rho, clock = polar(up, right)
-            if not (inner < rho < outer and -margin < chainage < axis[16] + margin):
+            if not (tube.inner < rho < tube.outer and tube.begin < chainage < tube.end):
                 continue
             tx, ty, tz = tangent(axis, chainage)
             ahead = (
@@ -269,17 +410,31 @@ def points_on(
 
 
 @njit(cache=True, nogil=True)
-def stride_of(starts, cells, few):
-    """Every how many-th point of some cells to look at, so that there are not more than few."""
+def stride_of(grid, cells, max_points):
+    """Return the stride at which no more than a given number of the points of cells are examined.
+
+    Parameters
+    ----------
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    max_points : 0 for all
+    """
     n = 0
     for c in cells:
-        n += starts[c + 1] - starts[c]
-    return max(1, -(-n // few)) if few > 0 else 1
+        n += grid.starts[c + 1] - grid.starts[c]
+    return max(1, -(-n // max_points)) if max_points > 0 else 1
 
 
 @njit(cache=True, nogil=True)
 def usual_spacing(spacing, chosen, least):
-    """Median distance of chosen points to their neighbours where it is known; not below `least`."""
+    """Return the median distance of chosen points to their neighbours, metres.
+
+    Parameters
+    ----------
+    spacing (n,) : of every point, nan where not known, metres
+    chosen (m,) : indices of points
+    least : least value returned, and the one where none is known, metres
+    """
     known = np.empty(chosen.shape[0])
     n = 0
     for i in chosen:
@@ -290,36 +445,44 @@ def usual_spacing(spacing, chosen, least):
 
 
 @njit(cache=True, nogil=True)
-def look_on(
-    grid, xyz, normals, spacing, voxel, is_free, members, starts, axis, shell, inner, outer,
-    margin, kind, surface, band, min_cos, few,
-):  # fmt: skip
-    """Find the points on a surface about an axis; see `cells_around` and `points_on`.
+def points_on_surface(points, spacing, voxel, grid, tube, shell, target, max_points):
+    """Find the points on a surface about an axis, of a sample of them where there are many.
 
-    Where cells hold more than `few` points a sample is looked at, if `few` is not 0. Returns
-    what `points_on` does and the distance between neighbours among the points looked at.
+    Parameters
+    ----------
+    points : OrientedPoints
+    spacing (n,) : distance of each point to its neighbours, metres
+    voxel : least spacing, metres
+    grid : PointCells
+    tube : Tube in which points may lie
+    shell : Tube whose cells are examined
+    target : Target
+    max_points : number of points in the cells above which a sample is examined; 0 for all
+
+    Returns
+    -------
+    As `points_on`, and the distance between neighbours among the examined points, metres.
     """
-    cells = cells_around(
-        grid[0], grid[1], grid[2], grid[3], grid[4], grid[5], grid[6], grid[7], grid[8],
-        axis, shell[0], shell[1], -margin, axis[16] + margin,
-    )  # fmt: skip
-    stride = stride_of(starts, cells, few)
-    own, columns = points_on(
-        xyz, normals, is_free, members, starts, cells, axis, inner, outer, margin,
-        kind, surface, band, min_cos, stride,
-    )  # fmt: skip
-    return own, columns, usual_spacing(spacing, own, voxel) * math.sqrt(stride)
+    cells = cells_around(grid, shell)
+    stride = stride_of(grid, cells, max_points)
+    inliers, columns = points_on(points, grid, cells, tube, target, stride)
+    return inliers, columns, usual_spacing(spacing, inliers, voxel) * math.sqrt(stride)
 
 
 @njit(cache=True, nogil=True)
-def points_inside(
-    xyz, normals, members, starts, cells, axis, inner, outer, begin, end,
-    kind, surface, depth, min_cos,
-):  # fmt: skip
-    """Chainage and clock (2, m) of points deeper than `depth` inside a surface, as `points_on`.
+def points_inside(points, grid, cells, tube, target):
+    """Return chainage and clock (2, m) of the points inside a surface about an axis.
 
-    Only between the chainages `begin` and `end`.
+    Parameters
+    ----------
+    points : OrientedPoints, free or not
+    grid : PointCells
+    cells (c,) : indices of fine cells
+    tube : Tube
+    target : Target
     """
+    xyz, normals = points.xyz, points.normals
+    members, starts, axis = grid.members, grid.starts, tube.axis
     table = np.empty((256, 2))
     row = np.empty(MOST_PARAMETERS)
     n = 0
@@ -327,15 +490,15 @@ def points_inside(
         for m in range(starts[c], starts[c + 1]):
             i = members[m]
             x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-            residual, ox, oy, oz = at_point(kind, surface, x, y, z, row)
-            if not residual < -depth:
+            residual, ox, oy, oz = at_point(target.kind, target.surface, x, y, z, row)
+            if not residual < -target.depth:
                 continue
             cosine = normals[i, 0] * ox + normals[i, 1] * oy + normals[i, 2] * oz
-            if not abs(cosine) > min_cos:
+            if not abs(cosine) > target.min_cos:
                 continue
             chainage, up, right = across_axis(axis, x, y, z)
             rho, clock = polar(up, right)
-            if inner < rho < outer and begin < chainage < end:
+            if tube.inner < rho < tube.outer and tube.begin < chainage < tube.end:
                 if n == table.shape[0]:
                     longer = np.empty((2 * n, 2))
                     longer[:n] = table
@@ -347,7 +510,13 @@ def points_inside(
 
 @njit(cache=True, nogil=True)
 def tangent(axis, chainage):
-    """Unit tangent of an axis towards increasing chainage."""
+    """Return the unit tangent of an axis towards increasing chainage.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    chainage : metres
+    """
     bend = axis[12]
     if bend == 0.0:
         return axis[3], axis[4], axis[5]
@@ -361,8 +530,18 @@ def tangent(axis, chainage):
 
 
 @njit(cache=True, nogil=True)
-def behind(members, starts, chosen, xyz, index, places):
-    """Write the points behind chosen thinned points, each one's in the order of their places."""
+def full_resolution_points(members, starts, chosen, xyz, index, places):
+    """Write the full-resolution points that chosen voxel means stand for.
+
+    Those of one mean are in the order of their coordinates.
+
+    Parameters
+    ----------
+    members (n,), starts (m + 1,) : the points of each mean, and where they begin
+    chosen (c,) : indices of means
+    xyz (n, 3) : full-resolution points, metres
+    index (k,), places (k, 3) : filled with indices and coordinates
+    """
     n = 0
     for c in chosen:
         first = n

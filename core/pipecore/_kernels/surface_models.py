@@ -20,7 +20,12 @@ MOST_PARAMETERS = 7
 
 @njit(cache=True, nogil=True)
 def n_parameters(kind):
-    """Number of parameters of a kind of surface."""
+    """Return the number of parameters of a kind of surface.
+
+    Parameters
+    ----------
+    kind : CYLINDER, CONE, TORUS or SPHERE
+    """
     if kind == CYLINDER:
         return 5
     if kind == CONE:
@@ -30,7 +35,12 @@ def n_parameters(kind):
 
 @njit(cache=True, nogil=True)
 def across(x, y, z):
-    """Two unit vectors across a unit vector and each other."""
+    """Return two unit vectors across a unit vector and each other.
+
+    Parameters
+    ----------
+    x, y, z : the vector
+    """
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         length = math.hypot(y, z)
         a, b, c = 0.0, -z / length, y / length
@@ -45,7 +55,12 @@ def across(x, y, z):
 
 @njit(cache=True, nogil=True)
 def place_frame(surface):
-    """Write the two vectors across the direction of a surface."""
+    """Write the two vectors across the direction of a surface.
+
+    Parameters
+    ----------
+    surface (14,) : see the module; changed
+    """
     a, b, c, d, e, f = across(surface[3], surface[4], surface[5])
     surface[6], surface[7], surface[8] = a, b, c
     surface[9], surface[10], surface[11] = d, e, f
@@ -53,9 +68,15 @@ def place_frame(surface):
 
 @njit(cache=True, nogil=True)
 def at_point(kind, surface, x, y, z, slopes):
-    """Signed distance of a point, and the outward unit vector there; writes the derivatives.
+    """Return the signed distance of a point and the outward unit vector there.
 
     nan where the direction outward is not defined: on the axis.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see the module
+    x, y, z : metres
+    slopes (MOST_PARAMETERS,) : filled with the derivatives of the distance
     """
     px, py, pz = x - surface[0], y - surface[1], z - surface[2]
     if kind == SPHERE:
@@ -105,7 +126,14 @@ def at_point(kind, surface, x, y, z, slopes):
 
 @njit(cache=True, nogil=True)
 def at_points(kind, surface, xyz, residuals, slopes, outward):
-    """Write distances (n,), derivatives (n, p) and outward unit vectors (n, 3) of points."""
+    """Write signed distances, derivatives and outward unit vectors of points.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see the module
+    xyz (n, 3) : points, metres
+    residuals (n,), slopes (n, p), outward (n, 3) : filled
+    """
     row = np.empty(MOST_PARAMETERS)
     for i in range(xyz.shape[0]):
         residuals[i], outward[i, 0], outward[i, 1], outward[i, 2] = at_point(
@@ -117,7 +145,13 @@ def at_points(kind, surface, xyz, residuals, slopes, outward):
 
 @njit(cache=True, nogil=True)
 def move(kind, surface, step):
-    """Move a surface by a step of its parameters, in place."""
+    """Move a surface by a step of its parameters, in place.
+
+    Parameters
+    ----------
+    kind, surface (14,) : see the module; changed
+    step (p,) : in the order of the parameters
+    """
     if kind == SPHERE:
         for k in range(3):
             surface[k] += step[k]

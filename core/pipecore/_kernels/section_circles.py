@@ -10,9 +10,16 @@ from pipecore._kernels.circles import covered_arc, geometric_circle, taubin_circ
 
 @njit(cache=True, nogil=True)
 def fit_sections(x, y, starts, max_gap, fits):
-    """Fit a circle to each group of points; write centre x, y, radius, rms and arc.
+    """Fit a circle to each group of points.
 
-    All points weigh the same: a dent is meant to show. nan where there is no circle.
+    All points weigh the same: a dent is meant to show.
+
+    Parameters
+    ----------
+    x, y (n,) : grouped, metres
+    starts (m + 1,) : where each group begins
+    max_gap : gap between neighbouring points that counts as covered, metres
+    fits (m, 5) : filled with centre x, y, radius, rms, metres, and arc, radians; nan for none
     """
     for c in range(starts.shape[0] - 1):
         a, b = starts[c], starts[c + 1]

@@ -1,12 +1,14 @@
 """Local surface properties of points from their neighbours, found in a hashed grid of cells."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from pipecore._kernels.eigen import eigenvalues, eigenvector, least_eigenpair
-from pipecore._kernels.voxels import EMPTY, slot_of
+from pipecore._kernels.voxel_hash import EMPTY, HashTable, slot_of
 
 LANES = 16
 FAR_OFF = np.float32(1e18)
@@ -17,29 +19,53 @@ _ROWS = np.array([0, 0, 9, 34, 83, 164])
 """Where the rows of cells of each reach begin among those of all reaches."""
 
 
+class SortedCells(NamedTuple):
+    """Cubic cells that hold points, which are sorted by cell.
+
+    keys (c,): numbers of the cells, ascending;
+    starts (c + 1,): where the points of each begin;
+    n_y, n_z: numbers of cells along y and z.
+    """
+
+    keys: NDArray[np.int64]
+    starts: NDArray[np.integer]
+    n_y: int
+    n_z: int
+
+
+class FoundCells(NamedTuple):
+    """Cubic cells that hold points, looked up by a hash table.
+
+    order (n,): the points, cell by cell;
+    cells: the cells in that order;
+    table: from the cells' numbers to their places in `cells`.
+    """
+
+    order: NDArray[np.integer]
+    cells: SortedCells
+    table: HashTable
+
+
 @njit(cache=True, nogil=True)
 def fit_planes(
-    xyz,
-    cell_keys,
-    cell_starts,
-    n_y,
-    n_z,
-    radius,
-    min_neighbours,
-    start,
-    stop,
-    places,
-    normals,
-    residuals,
-    spacings,
+    xyz, cells, radius, min_neighbours, start, stop, places, normals, residuals, spacings
 ):
-    """Fit a plane to the neighbours of the points of cells start … stop within `radius`.
+    """Fit a plane to the neighbours of the points of some cells.
 
-    Where there are fewer than `min_neighbours`, the radius grows in steps up to fourfold.
-    `xyz` is sorted by cell, whose edge is `radius`. Writes, at each point's `places`, the
-    normal, the root mean square distance from the plane, and the spacing of the points;
-    nan where there are too few.
+    Where there are too few neighbours, the radius grows in steps up to fourfold.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points sorted by cell, metres
+    cells : SortedCells of edge `radius`
+    radius : within which neighbours lie, metres
+    min_neighbours : least number of neighbours, the point itself among them
+    start, stop : range of cells
+    places (n,) : where the results of each point are written
+    normals (n, 3), residuals, spacings (n,) : filled with unit normals, root mean square
+      distance from the plane and point spacing, metres; nan where there are too few neighbours
     """
+    cell_starts = cells.starts
     first, last = np.empty(81, np.int64), np.empty(81, np.int64)
     begins = np.zeros(_ROWS[-1], np.int64)
     near = np.empty((3, 512), np.float32)
@@ -50,7 +76,7 @@ def fit_planes(
     for c in range(start, stop):
         # Looked up once for all points of the cell, and copied side by side.
         reach = 1
-        n_ranges = list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last)
+        n_ranges = list_ranges(c, reach, cells, begins, first, last)
         n_near = 0
         for k in range(n_ranges):
             n_near += last[k] - first[k]
@@ -79,9 +105,7 @@ def fit_planes(
                 for quarters in (5, 6, 7, 8, 10, 12, 16):
                     if reach != (quarters + 3) // 4:
                         reach = (quarters + 3) // 4
-                        n_ranges = list_ranges(
-                            c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last
-                        )
+                        n_ranges = list_ranges(c, reach, cells, begins, first, last)
                     reaches[n_points] = 0.25 * quarters * radius
                     sum_ranges(xyz, i, n_ranges, first, last, reaches[n_points], own)
                     if own[0] >= min_neighbours:
@@ -99,9 +123,16 @@ def fit_planes(
 
 @njit(cache=True, nogil=True)
 def copy_ranges(xyz, zero, n_ranges, first, last, near):
-    """Copy the points of some ranges, relative to the point `zero`; return their number.
+    """Copy the points of some ranges, relative to one point; return their number.
 
-    Filled up to whole lanes by what is out of reach.
+    Filled up to whole lanes by points out of reach.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    zero : index of that point
+    n_ranges, first, last (ranges,) : the ranges
+    near (3, m) : filled, single precision
     """
     x, y, z = xyz[zero, 0], xyz[zero, 1], xyz[zero, 2]
     n = 0
@@ -121,8 +152,14 @@ def copy_ranges(xyz, zero, n_ranges, first, last, near):
 def sums_within(xs, ys, zs, px, py, pz, r2, sums):
     """Write count, sums and sums of products of the points within reach of one, relative to it.
 
-    All in single precision, a ten millionth of the reach, and added up in lanes side by side:
-    many times as fast as one after the other.
+    In single precision, a ten millionth of the reach, and summed in lanes side by side.
+
+    Parameters
+    ----------
+    xs, ys, zs (n,) : points, metres
+    px, py, pz : that one
+    r2 : square of the reach, metres²
+    sums (N_SUMS,) : filled with n, x, y, z, xx, xy, xz, yy, yz, zz
     """
     none, one = np.float32(0.0), np.float32(1.0)
     n = sx = sy = sz = sxx = sxy = sxz = syy = syz = szz = none
@@ -147,7 +184,16 @@ def sums_within(xs, ys, zs, px, py, pz, r2, sums):
 
 @njit(cache=True, nogil=True)
 def sum_ranges(xyz, i, n_ranges, first, last, reach, sums):
-    """Write what `sums_within` does, of the points of some ranges within `reach` of a point."""
+    """Write what `sums_within` does, of the points of some ranges.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    i : index of the point
+    n_ranges, first, last (ranges,) : the ranges
+    reach : metres
+    sums (N_SUMS,) : filled
+    """
     px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
     sums[:] = 0.0
     for k in range(n_ranges):
@@ -168,7 +214,15 @@ def sum_ranges(xyz, i, n_ranges, first, last, reach, sums):
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
 def solve_planes(n_points, sums, reaches, planes):
-    """Write the normal, residual and spacing of the neighbourhoods with the given sums."""
+    """Write normal, residual and spacing of neighbourhoods.
+
+    Parameters
+    ----------
+    n_points : number of neighbourhoods
+    sums (N_SUMS, BATCH) : of each, see `sums_within`
+    reaches (BATCH,) : metres
+    planes (5, BATCH) : filled with the unit normal, residual and spacing
+    """
     for i in range(n_points):
         n = sums[0, i]
         x, y, z = sums[1, i] / n, sums[2, i] / n, sums[3, i] / n
@@ -181,7 +235,15 @@ def solve_planes(n_points, sums, reaches, planes):
 
 @njit(cache=True, nogil=True)
 def write_planes(n_points, planes, points, normals, residuals, spacings):
-    """Write what was found of each point to its place."""
+    """Write the planes of a batch to their points.
+
+    Parameters
+    ----------
+    n_points : number of points
+    planes (5, BATCH) : of `solve_planes`
+    points (BATCH,) : place of each
+    normals (n, 3), residuals, spacings (n,) : filled there
+    """
     for i in range(n_points):
         at = points[i]
         normals[at, 0], normals[at, 1], normals[at, 2] = planes[0, i], planes[1, i], planes[2, i]
@@ -189,12 +251,20 @@ def write_planes(n_points, planes, points, normals, residuals, spacings):
 
 
 @njit(cache=True, nogil=True)
-def list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last):
-    """List the ranges of points of the cells within `reach` of cell `c`; return their number.
+def list_ranges(c, reach, cells, begins, first, last):
+    """List the ranges of points in the cells around one; return their number.
 
-    Cells are numbered row by row, so that those of a row lie side by side. Where the rows
-    around begin is kept in `begins` from call to call, which are made for rising cells.
+    Cells are numbered row by row, so that those of a row lie side by side.
+
+    Parameters
+    ----------
+    c : index of the cell
+    reach : number of cells to either side
+    cells : SortedCells
+    begins (164,) : where rows around begin; kept from call to call, for rising cells
+    first, last (ranges,) : filled
     """
+    cell_keys, cell_starts, n_y, n_z = cells.keys, cells.starts, cells.n_y, cells.n_z
     n_cells = cell_keys.shape[0]
     row = _ROWS[reach]
     n = 0
@@ -215,9 +285,15 @@ def list_ranges(c, reach, cell_keys, cell_starts, n_y, n_z, begins, first, last)
 
 @njit(cache=True, nogil=True)
 def first_from(keys, begin, low):
-    """Position of the first of ascending keys, from `begin` on, that is not below `low`.
+    """Return the index of the first key that is not below a limit, from an index on.
 
     Found in growing steps: it is mostly near.
+
+    Parameters
+    ----------
+    keys (n,) : ascending
+    begin : the index to begin at
+    low : the limit
     """
     n = keys.shape[0]
     if begin >= n or keys[begin] >= low:
@@ -237,35 +313,28 @@ def first_from(keys, begin, low):
 
 
 @njit(cache=True, nogil=True)
-def fit_local_axes(
-    xyz,
-    normals,
-    order,
-    cell_keys,
-    cell_starts,
-    table_keys,
-    table_ids,
-    n_y,
-    n_z,
-    radius,
-    sample,
-    own_cells,
-    start,
-    stop,
-    axes,
-    spreads,
-):
-    """Find the direction that is most perpendicular to the normals around sampled points.
+def fit_local_axes(xyz, normals, found, radius, sample, cell_of_sample, start, stop, axes, spreads):
+    """Find the direction most perpendicular to the normals around sampled points.
 
-    `order` lists the points cell by cell; `own_cells` are those of the samples.
-    Writes, for sample start … stop, the eigenvector of Σ n nᵀ with the smallest
-    eigenvalue, and the eigenvalues in ascending order divided by their sum.
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals, nan where not known
+    found : FoundCells of edge `radius`
+    radius : within which normals count, metres
+    sample (m,) : indices of the points
+    cell_of_sample (m,) : index of the cell of each
+    start, stop : range of the sample
+    axes (m, 3) : filled with the eigenvector of Σnnᵀ with the least eigenvalue
+    spreads (m, 3) : filled with the eigenvalues, ascending, over the number of normals
     """
+    order, table_keys, table_ids = found.order, found.table.keys, found.table.ids
+    cell_keys, cell_starts = found.cells.keys, found.cells.starts
+    n_y, n_z = found.cells.n_y, found.cells.n_z
     mask = np.int64(table_keys.shape[0] - 1)
     for k in range(start, stop):
         i = sample[k]
         px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        cell = own_cells[k]
+        cell = cell_of_sample[k]
         n = 0
         xx = xy = xz = yy = yz = zz = 0.0
         for dx in range(-1, 2):

@@ -1,63 +1,104 @@
 """Straight pieces of an axis, found among ellipse centres by random pairs."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from pipecore._kernels.draws import draw, seeded
 from pipecore._kernels.eigen import eigenvalues, eigenvector
+from pipecore._kernels.random_draws import draw, seeded
+
+Array = NDArray[np.float64]
 
 N_LINE_COLUMNS = 10
 """Columns of a line: middle x, y, z; direction x, y, z; radius there, slope; low, high."""
 
 
+class AxisEllipses(NamedTuple):
+    """Ellipses as points of an axis: n of them, metres.
+
+    centre, axis (n, 3): centres, and unit vectors along the pipe, of either sign;
+    radius, radius_sd (n,): radii and their standard deviations.
+    """
+
+    centre: Array
+    axis: Array
+    radius: Array
+    radius_sd: Array
+
+
+class PieceLimits(NamedTuple):
+    """What ellipses of one piece of an axis have in common.
+
+    min_cos: least cosine between an ellipse's axis and the piece's;
+    max_offset: largest distance of a centre from the axis, fraction of the radius;
+    max_change: largest change of radius from the piece's, fraction of it;
+    same_radius: the same once the piece is fitted;
+    min_taper: least change of radius per metre of a tapered piece;
+    min_length: least length, radii;
+    min_ellipses: least number of ellipses.
+    """
+
+    min_cos: float
+    max_offset: float
+    max_change: float
+    same_radius: float = 0.025
+    min_taper: float = 0.04
+    min_length: float = 0.5
+    min_ellipses: int = 5
+
+
 @njit(cache=True, nogil=True)
-def on_line(
-    cx,
-    cy,
-    cz,
-    ax,
-    ay,
-    az,
-    r,
-    sd,
-    px,
-    py,
-    pz,
-    dx,
-    dy,
-    dz,
-    radius,
-    slope,
-    min_cos,
-    max_offset,
-    max_change,
-):
-    """Whether an ellipse fits a straight axis with a radius that is linear along it."""
-    if abs(ax * dx + ay * dy + az * dz) < min_cos:
+def on_line(ellipses, k, line, limits):
+    """Return whether an ellipse fits a straight axis with a radius that is linear along it.
+
+    Parameters
+    ----------
+    ellipses : AxisEllipses
+    k : index of the ellipse
+    line (8 or more,) : point, unit direction, radius there, metres, and slope of the radius
+    limits : PieceLimits
+    """
+    dx, dy, dz = line[3], line[4], line[5]
+    axis, centre, sd = ellipses.axis, ellipses.centre, ellipses.radius_sd[k]
+    if abs(axis[k, 0] * dx + axis[k, 1] * dy + axis[k, 2] * dz) < limits.min_cos:
         return False
-    qx, qy, qz = cx - px, cy - py, cz - pz
+    qx, qy, qz = centre[k, 0] - line[0], centre[k, 1] - line[1], centre[k, 2] - line[2]
     s = qx * dx + qy * dy + qz * dz
-    expected = radius + slope * s
-    if not expected > 0.0 or abs(r - expected) > max_change * expected + 2.0 * sd:
+    expected = line[6] + line[7] * s
+    change = abs(ellipses.radius[k] - expected)
+    if not expected > 0.0 or change > limits.max_change * expected + 2.0 * sd:
         return False
     off2 = qx * qx + qy * qy + qz * qz - s * s
-    limit = max_offset * expected + 2.0 * min(sd, 0.03 * expected)
+    limit = limits.max_offset * expected + 2.0 * min(sd, 0.03 * expected)
     return off2 <= limit * limit
 
 
 @njit(cache=True, nogil=True)
-def best_line(
-    centre, axis, radius, sd, free, n_trials, is_tapered, min_cos, max_offset, max_change, inliers
-):
-    """Find the straight piece with most ellipses. Writes the inliers, returns their number.
+def best_line(ellipses, free, n_trials, is_tapered, limits, inliers):
+    """Find the straight piece with most ellipses, from pairs of centres.
 
-    With `is_tapered`, the radius changes along the piece as it does between the pair.
+    The pairs are drawn at random, always the same.
+
+    Parameters
+    ----------
+    ellipses : AxisEllipses, n of them
+    free (n,) : ellipses that may be used
+    n_trials : number of pairs
+    is_tapered : whether the radius changes along the piece as between the pair
+    limits : PieceLimits
+    inliers (n,) : filled
+
+    Returns
+    -------
+    Number of inliers, 0 where no pair defines a piece.
     """
+    centre, radius = ellipses.centre, ellipses.radius
     n = centre.shape[0]
     best = 0
-    line = np.zeros(8)
+    line, trial = np.zeros(8), np.empty(8)
     state = seeded(n)
     for _ in range(n_trials):
         state, i = draw(state, n)
@@ -87,73 +128,44 @@ def best_line(
                 continue
         else:
             start, slope = 0.5 * (radius[i] + radius[j]), 0.0
-            if abs(radius[i] - radius[j]) > max_change * start:
+            if abs(radius[i] - radius[j]) > limits.max_change * start:
                 continue
+        trial[0], trial[1], trial[2] = centre[i, 0], centre[i, 1], centre[i, 2]
+        trial[3], trial[4], trial[5] = dx, dy, dz
+        trial[6], trial[7] = start, slope
         count = 0
         for k in range(n):
-            if free[k] and on_line(
-                centre[k, 0],
-                centre[k, 1],
-                centre[k, 2],
-                axis[k, 0],
-                axis[k, 1],
-                axis[k, 2],
-                radius[k],
-                sd[k],
-                centre[i, 0],
-                centre[i, 1],
-                centre[i, 2],
-                dx,
-                dy,
-                dz,
-                start,
-                slope,
-                min_cos,
-                max_offset,
-                max_change,
-            ):
+            if free[k] and on_line(ellipses, k, trial, limits):
                 count += 1
         if count > best:
             best = count
-            line[0], line[1], line[2] = centre[i, 0], centre[i, 1], centre[i, 2]
-            line[3], line[4], line[5] = dx, dy, dz
-            line[6], line[7] = start, slope
+            line[:] = trial
     if best == 0:
         return 0
     for k in range(n):
-        inliers[k] = free[k] and on_line(
-            centre[k, 0],
-            centre[k, 1],
-            centre[k, 2],
-            axis[k, 0],
-            axis[k, 1],
-            axis[k, 2],
-            radius[k],
-            sd[k],
-            line[0],
-            line[1],
-            line[2],
-            line[3],
-            line[4],
-            line[5],
-            line[6],
-            line[7],
-            min_cos,
-            max_offset,
-            max_change,
-        )
+        inliers[k] = free[k] and on_line(ellipses, k, line, limits)
     return best
 
 
 @njit(cache=True, nogil=True)
-def weight_of(sd, k):
-    """Weight of an ellipse by how well its radius is known."""
-    return 1.0 / (sd[k] ** 2 + 1e-8)
+def weight_of(sd):
+    """Return the weight of an ellipse in the fit of an axis, 1/metres².
+
+    Parameters
+    ----------
+    sd : standard deviation of its radius, metres
+    """
+    return 1.0 / (sd**2 + 1e-8)
 
 
 @njit(cache=True, nogil=True)
 def weighted_median(values, weights):
-    """The value below which half of the weights are."""
+    """Return the value below which half of the weights are.
+
+    Parameters
+    ----------
+    values, weights (n,) : n > 0
+    """
     order = np.argsort(values)
     below, half = 0.0, 0.5 * weights.sum()
     for k in order:
@@ -164,16 +176,23 @@ def weighted_median(values, weights):
 
 
 @njit(cache=True, nogil=True)
-def fit_line(centre, radius, sd, chosen, is_tapered, line, along):
-    """Fit a line to the chosen centres, weighted by their precision, and its radius.
+def fit_line(ellipses, chosen, is_tapered, line, along):
+    """Fit a line to chosen centres, weighted by their precision, and the radius along it.
 
-    Writes the first eight columns of the line, and each chosen one's chainage from its middle.
+    Parameters
+    ----------
+    ellipses : AxisEllipses
+    chosen (m,) : indices of ellipses
+    is_tapered : whether the radius changes along the line
+    line (N_LINE_COLUMNS,) : first eight columns filled
+    along (m,) : filled with the chainage of each from the middle, metres
     """
+    centre, radius, sd = ellipses.centre, ellipses.radius, ellipses.radius_sd
     n = chosen.shape[0]
     weights, total, mx, my, mz = np.empty(n), 0.0, 0.0, 0.0, 0.0
     for m in range(n):
         k = chosen[m]
-        w = weight_of(sd, k)
+        w = weight_of(sd[k])
         weights[m], total = w, total + w
         mx, my, mz = mx + w * centre[k, 0], my + w * centre[k, 1], mz + w * centre[k, 2]
     mx, my, mz = mx / total, my / total, mz / total
@@ -205,17 +224,25 @@ def fit_line(centre, radius, sd, chosen, is_tapered, line, along):
 
 
 @njit(cache=True, nogil=True)
-def taper_of(radius, sd, chosen, along):
-    """Change of the radius along an axis, and its standard deviation."""
+def taper_of(ellipses, chosen, along):
+    """Return the change of the radius along an axis, and its standard deviation.
+
+    Parameters
+    ----------
+    ellipses : AxisEllipses
+    chosen (m,) : indices of ellipses
+    along (m,) : their chainages, metres
+    """
+    radius, sd = ellipses.radius, ellipses.radius_sd
     n = chosen.shape[0]
     total = mean_s = mean_r = 0.0
     for m in range(n):
-        w = weight_of(sd, chosen[m])
+        w = weight_of(sd[chosen[m]])
         total, mean_s, mean_r = total + w, mean_s + w * along[m], mean_r + w * radius[chosen[m]]
     mean_s, mean_r = mean_s / total, mean_r / total
     rise = run = square = 0.0
     for m in range(n):
-        w, s, r = weight_of(sd, chosen[m]), along[m] - mean_s, radius[chosen[m]] - mean_r
+        w, s, r = weight_of(sd[chosen[m]]), along[m] - mean_s, radius[chosen[m]] - mean_r
         rise, run, square = rise + w * s * r, run + w * s * s, square + w * r * r
     taper = rise / run
     left = max(square - taper * rise, 0.0)
@@ -224,7 +251,13 @@ def taper_of(radius, sd, chosen, along):
 
 @njit(cache=True, nogil=True)
 def longest_part(along, max_gap):
-    """Places of the part with most entries that has no gap longer than `max_gap`, in order."""
+    """Return the indices of the part with most entries that has no wide gap, ascending in chainage.
+
+    Parameters
+    ----------
+    along (n,) : chainages, metres
+    max_gap : widest gap, metres
+    """
     order = np.argsort(along)
     first = best_first = best_last = 0
     for k in range(1, order.shape[0] + 1):
@@ -236,52 +269,40 @@ def longest_part(along, max_gap):
 
 
 @njit(cache=True, nogil=True)
-def take_lines(
-    centre, axis, radius, sd, n_trials, is_tapered, limits, width, min_length, min_ellipses, piece
-):  # fmt: skip
-    """Take straight pieces off the ellipses, best first.
+def take_lines(ellipses, n_trials, is_tapered, limits, width, piece):
+    """Take straight pieces off ellipses, best first.
 
     Parameters
     ----------
-    centre, axis, radius, sd : ndarray
-        Of the ellipses.
-    n_trials : int
-    is_tapered : bool
-        Whether the radius changes along the pieces.
-    limits : tuple of float
-        Least cosine between axes, and by which shares of the radius centres may be off, the
-        radius of a pair, and that of a piece; least taper.
-    width, min_length : float
-        Usual width of the profiles, and the least length in radii.
-    min_ellipses : int
-    piece : ndarray of int32
-        Filled with the number of each ellipse's piece, -1 for none.
+    ellipses : AxisEllipses, n of them
+    n_trials : random pairs tried for each piece
+    is_tapered : whether the radius changes along the pieces
+    limits : PieceLimits
+    width : usual width of the profiles, metres
+    piece (n,) : filled with the number of each ellipse's piece, -1 for none
 
     Returns
     -------
-    ndarray, shape (k, N_LINE_COLUMNS)
+    Pieces (k, N_LINE_COLUMNS).
     """
-    min_cos, max_offset, max_change, same_radius, min_taper = limits
-    n = centre.shape[0]
+    radius, sd, min_ellipses = ellipses.radius, ellipses.radius_sd, limits.min_ellipses
+    n = radius.shape[0]
     free, inliers = np.ones(n, np.bool_), np.empty(n, np.bool_)
     lines = np.empty((n // min_ellipses + 1, N_LINE_COLUMNS))
     piece[:] = -1
     n_free, n_found, n_failed = n, 0, 0
     while n_free >= min_ellipses and n_failed < 3:
-        count = best_line(
-            centre, axis, radius, sd, free, n_trials, is_tapered, min_cos, max_offset, max_change,
-            inliers,
-        )  # fmt: skip
+        count = best_line(ellipses, free, n_trials, is_tapered, limits, inliers)
         if count < min_ellipses:
             break
         drawn = np.flatnonzero(inliers)
         line, along = lines[n_found], np.empty(count)
-        fit_line(centre, radius, sd, drawn, is_tapered, line, along)
+        fit_line(ellipses, drawn, is_tapered, line, along)
         # The pair's radius was rough: what is off the piece's own pattern stays free.
         chosen, n_fit = np.empty(count, np.int64), 0
         for m in range(count):
             k, expected = drawn[m], line[6] + line[7] * along[m]
-            if abs(radius[k] - expected) < same_radius * expected + 2.0 * sd[k]:
+            if abs(radius[k] - expected) < limits.same_radius * expected + 2.0 * sd[k]:
                 chosen[n_fit], along[n_fit] = k, along[m]
                 n_fit += 1
         chosen, along = chosen[:n_fit], along[:n_fit]
@@ -294,12 +315,12 @@ def take_lines(
         for k in given_up:
             free[k] = False
         n_free -= given_up.shape[0]
-        if chosen.shape[0] < min_ellipses or length < max(min_length * line[6], 2.5 * width):
+        if chosen.shape[0] < min_ellipses or length < max(limits.min_length * line[6], 2.5 * width):
             n_failed += 1
             continue
-        fit_line(centre, radius, sd, chosen, is_tapered, line, along)
-        taper, taper_sd = taper_of(radius, sd, chosen, along)
-        if is_tapered != (abs(taper) > max(min_taper, 6.0 * taper_sd)):
+        fit_line(ellipses, chosen, is_tapered, line, along)
+        taper, taper_sd = taper_of(ellipses, chosen, along)
+        if is_tapered != (abs(taper) > max(limits.min_taper, 6.0 * taper_sd)):
             continue
         line[8], line[9] = along.min() - 0.5 * width, along.max() + 0.5 * width
         for k in chosen:

@@ -13,7 +13,12 @@ from numba import njit
 
 @njit(cache=True, nogil=True)
 def polar(up, right):
-    """Distance and clock angle in [0, 2π)."""
+    """Return distance and clock angle in [0, 2π) of a point across an axis.
+
+    Parameters
+    ----------
+    up, right : towards 12:00 and 3:00, metres
+    """
     clock = math.atan2(right, up)
     if clock < 0.0:
         clock += 2.0 * math.pi
@@ -25,7 +30,13 @@ def polar(up, right):
 
 @njit(cache=True, nogil=True)
 def across_axis(axis, x, y, z):
-    """Chainage of a point, and how far up and right of the axis it is."""
+    """Return the chainage of a point, and its offsets to 12:00 and 3:00 of the axis, metres.
+
+    Parameters
+    ----------
+    axis (17,) : see the module
+    x, y, z : metres
+    """
     px, py, pz = x - axis[0], y - axis[1], z - axis[2]
     along = px * axis[3] + py * axis[4] + pz * axis[5]
     a = px * axis[6] + py * axis[7] + pz * axis[8]
@@ -42,7 +53,14 @@ def across_axis(axis, x, y, z):
 
 @njit(cache=True, nogil=True)
 def pipe_coordinates(axis, xyz, chainage, rho, clock):
-    """Write chainage, distance from the axis and clock angle of points (n, 3)."""
+    """Write chainage, distance from the axis and clock angle of points.
+
+    Parameters
+    ----------
+    axis (17,) : see the module
+    xyz (n, 3) : metres
+    chainage, rho, clock (n,) : filled, metres, metres and radians
+    """
     for i in range(xyz.shape[0]):
         chainage[i], up, right = across_axis(axis, xyz[i, 0], xyz[i, 1], xyz[i, 2])
         rho[i], clock[i] = polar(up, right)

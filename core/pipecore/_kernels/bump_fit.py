@@ -7,18 +7,52 @@ and width, c, and if there are seven, log q. The section b is a bell, cos²(π/2
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from pipecore._kernels.linear import mirror, solve_in_place
 
 BELL, CONE, FRUSTUM = 0, 1, 2
 
 
+class BumpPoints(NamedTuple):
+    """Points of a bump, each (n,), metres.
+
+    along, around: place in the plane of the unrolled surface;
+    deviation: height above the contour;
+    noise: its standard deviation.
+    """
+
+    along: NDArray[np.float64]
+    around: NDArray[np.float64]
+    deviation: NDArray[np.float64]
+    noise: NDArray[np.float64]
+
+
+class BumpPrior(NamedTuple):
+    """Priors as residuals, slopes · p - middle, of unit variance.
+
+    slopes (m, p): their derivatives by the parameters;
+    middle (m,): their values at p = 0, negative.
+    """
+
+    slopes: NDArray[np.float64]
+    middle: NDArray[np.float64]
+
+
 @njit(cache=True, nogil=True)
 def section(form, rho, q):
-    """Height of a section, and its derivatives by ρ and by log q."""
+    """Return the height of a section, and its derivatives by ρ and by log q.
+
+    Parameters
+    ----------
+    form : BELL, CONE or FRUSTUM
+    rho : distance from the peak, fraction of the half extents
+    q : exponent of the bell, or shape of the frustum
+    """
     if rho >= 1.0:
         return 0.0, 0.0, 0.0
     if form == CONE:
@@ -36,11 +70,21 @@ def section(form, rho, q):
 
 
 @njit(cache=True, nogil=True)
-def gather(form, p, along, around, deviation, noise, slopes, middle, normal, right):
-    """Write JᵀJ and -Jᵀr of the residuals (bump - deviation) / noise, and return Σr².
+def gather(form, p, points, prior, normal, right):
+    """Write JᵀJ and -Jᵀr of the residuals r = (bump - deviation) / noise, and return Σr².
 
-    J are their derivatives by the parameters. Beliefs are residuals too, slopes · p - middle.
+    J are the derivatives of the residuals by the parameters; priors count as residuals.
+
+    Parameters
+    ----------
+    form : BELL, CONE or FRUSTUM
+    p (6 or 7,) : parameters, see the module
+    points : BumpPoints
+    prior : BumpPrior
+    normal (p, p), right (p,) : filled
     """
+    along, around, deviation, noise = points.along, points.around, points.deviation, points.noise
+    slopes, middle = prior.slopes, prior.middle
     n_free = p.shape[0]
     length, width = math.exp(p[3]), math.exp(p[4])
     q = math.exp(p[6]) if n_free > 6 else 1.0
@@ -82,11 +126,18 @@ def gather(form, p, along, around, deviation, noise, slopes, middle, normal, rig
 
 
 @njit(cache=True, nogil=True)
-def fit(form, first, along, around, deviation, noise, slopes, middle, n_most, tolerance, p, normal):
-    """Fit a bump by Levenberg and Marquardt's method, from `first`; return Σr².
+def fit(form, first, points, prior, max_evaluations, tolerance, p, normal):
+    """Fit a bump by the method of Levenberg and Marquardt, and return Σr².
 
-    Writes its parameters and their normal matrix. It ends where a step neither gained nor
-    promised more than `tolerance` of Σr², or after `n_most` looks at the points.
+    Parameters
+    ----------
+    form : BELL, CONE or FRUSTUM
+    first (6 or 7,) : parameters to start from
+    points : BumpPoints
+    prior : BumpPrior
+    max_evaluations : most evaluations of the residuals
+    tolerance : it ends where a step neither gained nor promised more of Σr², a fraction
+    p (p,), normal (p, p) : filled with the parameters and their normal matrix
     """
     n_free = first.shape[0]
     damping = 1e-3
@@ -94,8 +145,8 @@ def fit(form, first, along, around, deviation, noise, slopes, middle, n_most, to
     ahead, ahead_normal = np.empty(n_free), np.empty((n_free, n_free))
     damped, step = np.empty((n_free, n_free)), np.empty(n_free)
     p[:] = first
-    total = gather(form, p, along, around, deviation, noise, slopes, middle, normal, right)
-    for _ in range(n_most - 1):
+    total = gather(form, p, points, prior, normal, right)
+    for _ in range(max_evaluations - 1):
         damped[:, :] = normal
         step[:] = right
         for k in range(n_free):
@@ -105,9 +156,7 @@ def fit(form, first, along, around, deviation, noise, slopes, middle, n_most, to
         for k in range(n_free):
             promised += step[k] * (right[k] + damping * normal[k, k] * step[k])
             ahead[k] = p[k] + step[k]
-        there = gather(
-            form, ahead, along, around, deviation, noise, slopes, middle, ahead_normal, ahead_right
-        )
+        there = gather(form, ahead, points, prior, ahead_normal, ahead_right)
         gained = total - there
         if gained >= 0.0:  # also false where it is not a number
             p[:] = ahead

@@ -6,14 +6,22 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.grouping import group_by_label
+from pipecore.robust import MAD_TO_SD
 
-FEW = 16
-"""So many values are sorted sooner than their median is selected."""
+MAX_SORTED = 16
+"""Up to as many values are sorted sooner than their median is selected."""
 
 
 @njit(cache=True, nogil=True)
 def group_medians(group, values, medians, counts):
-    """Write the median and the number of the values of each group; nan where there are none."""
+    """Write the median and the number of the values of each group; nan for empty groups.
+
+    Parameters
+    ----------
+    group (n,) : group of each value
+    values (n,) : any unit
+    medians, counts (m,) : filled
+    """
     members, starts = group_by_label(group, medians.shape[0])
     for k in range(medians.shape[0]):
         n = starts[k + 1] - starts[k]
@@ -21,19 +29,28 @@ def group_medians(group, values, medians, counts):
         if n == 0:
             medians[k] = math.nan
             continue
-        own = np.empty(n)
+        sample = np.empty(n)
         for i in range(n):
-            own[i] = values[members[starts[k] + i]]
-        if n > FEW:
-            medians[k] = np.median(own)
+            sample[i] = values[members[starts[k] + i]]
+        if n > MAX_SORTED:
+            medians[k] = np.median(sample)
         else:
-            own.sort()
-            medians[k] = (own[(n - 1) // 2] + own[n // 2]) / 2.0
+            sample.sort()
+            medians[k] = (sample[(n - 1) // 2] + sample[n // 2]) / 2.0
 
 
 @njit(cache=True, nogil=True)
 def interpolate(table, row_size, column_angle, chainage, clock, values):
-    """Write a table's values at points, bilinear between the middles of cells, round the clock."""
+    """Write a table's values at points, bilinear between the middles of cells, round the clock.
+
+    Parameters
+    ----------
+    table (rows, columns) : any unit
+    row_size : length of a cell, metres
+    column_angle : of a cell, radians
+    chainage, clock (n,) : metres and radians
+    values (n,) : filled
+    """
     n_rows, n_columns = table.shape
     for i in range(chainage.shape[0]):
         row = min(max(chainage[i] / row_size - 0.5, 0.0), n_rows - 1.0)
@@ -48,7 +65,17 @@ def interpolate(table, row_size, column_angle, chainage, clock, values):
 
 @njit(cache=True, nogil=True)
 def strongest(z, free):
-    """Largest magnitude among free cells, and the first cell, counted in rows, that has it."""
+    """Return the largest magnitude among free cells, and the first cell that has it.
+
+    Parameters
+    ----------
+    z (rows, columns) : any unit
+    free (rows, columns) : cells that count
+
+    Returns
+    -------
+    Magnitude and flat index, 0 and 0 where there is none.
+    """
     most, place = 0.0, 0
     for r in range(z.shape[0]):
         for c in range(z.shape[1]):
@@ -59,9 +86,15 @@ def strongest(z, free):
 
 @njit(cache=True, nogil=True)
 def correlate(table, along, around, result):
-    """Write a table's correlation with odd kernels along its rows' order and round the clock.
+    """Write a table's correlation with odd kernels along its rows and round the clock.
 
     Nothing lies beyond the ends.
+
+    Parameters
+    ----------
+    table (rows, columns) : any unit
+    along (k,), around (m,) : kernels of odd length; m may not exceed twice the columns
+    result (rows, columns) : filled
     """
     n_rows, n_columns = table.shape
     half, turn = along.shape[0] // 2, around.shape[0] // 2
@@ -82,20 +115,30 @@ def correlate(table, along, around, result):
 
 
 @njit(cache=True, nogil=True)
-def score(height, precision, is_told, contour_sd, allowed, z):
-    """Turn what a filter gathered into heights, and write them in units of their noise.
+def score(height, precision, is_measurable, contour_sd, allowed, z):
+    """Turn weighted sums into heights, and write them in units of their noise.
 
-    Returns how wide these scatter over the cells where they are told and allowed, 1 where
-    these are few; z is 0 where nothing is told.
+    Parameters
+    ----------
+    height (rows, columns) : Σ k w d; becomes Σ k w d / Σ k² w, metres
+    precision (rows, columns) : Σ k² w, 1/metres²
+    is_measurable (rows, columns) : cells with enough points; z is 0 elsewhere
+    contour_sd (rows, columns) : standard deviation of the contour, metres
+    allowed (rows, columns) : cells that the spread is taken of
+    z (rows, columns) : filled
+
+    Returns
+    -------
+    Robust standard deviation of z, 1 where there are few cells.
     """
     quiet, n = np.empty(z.size), 0
     for r in range(z.shape[0]):
         for c in range(z.shape[1]):
             height[r, c] /= precision[r, c]
             z[r, c] = 0.0
-            if is_told[r, c]:
+            if is_measurable[r, c]:
                 z[r, c] = height[r, c] / math.sqrt(1.0 / precision[r, c] + contour_sd[r, c] ** 2)
                 if allowed[r, c]:
                     quiet[n] = abs(z[r, c])
                     n += 1
-    return 1.4826 * np.median(quiet[:n]) if n > 20 else 1.0
+    return MAD_TO_SD * np.median(quiet[:n]) if n > 20 else 1.0

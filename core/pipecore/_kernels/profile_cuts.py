@@ -1,10 +1,13 @@
 """Cutting profiles and joining their points to curves."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from pipecore._kernels.disjoint_sets import find_root, unite
 from pipecore._kernels.grouping import argsort_keys
 
 NOT_CUT = np.int32(-(2**31))
@@ -13,21 +16,67 @@ MOST_PROFILES = 2.0**31
 """Points that are this many profiles from the local zero do not join either."""
 
 
+class StackCut(NamedTuple):
+    """How a stack cuts.
+
+    direction, e1, e2 (3,): unit vectors along the stack and in its profiles' planes;
+    width: of a profile, metres;
+    offset: of profile 0 from the local zero along the direction, metres.
+    """
+
+    direction: NDArray[np.float64]
+    e1: NDArray[np.float64]
+    e2: NDArray[np.float64]
+    width: float
+    offset: float
+
+
+class Smoothness(NamedTuple):
+    """When two neighbouring points lie on one smooth curve.
+
+    cos_corner: least cosine between their normals; below 0 nearness is enough;
+    offset, slope: a chord leaves the perpendicular to the bisector of the normals by at most
+    offset + slope · chord, metres.
+    """
+
+    cos_corner: float
+    offset: float
+    slope: float
+
+
 @njit(cache=True, nogil=True)
 def height_of(xyz, i, direction, offset):
-    """Distance of a point along the stack's direction."""
+    """Return the distance of a point along a stack's direction, metres.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    i : index of the point
+    direction (3,) : unit vector
+    offset : zero of the distance, metres
+    """
     return xyz[i, 0] * direction[0] + xyz[i, 1] * direction[1] + xyz[i, 2] * direction[2] - offset
 
 
 @njit(cache=True, nogil=True)
-def carry_point(xyz, normals, i, nd, direction, e1, e2, width, offset):
+def carry_point(xyz, normals, i, nd, cut):
     """Carry a point along its tangent plane to the mid-plane of its profile.
 
-    p - h·(d - (d·n)n) / (1 - (d·n)²), h being the point's offset from the mid-plane
-    along the stack direction d. Returns the profile's index, the position in the plane
-    (e1, e2), and the normal's components along e1 and e2.
+    p - h·(d - (d·n)n) / (1 - (d·n)²), h being the point's offset from the mid-plane.
+
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals
+    i : index of the point
+    nd : n·d
+    cut : StackCut
+
+    Returns
+    -------
+    Index of the profile, position (u, v) in its plane, and the normal's components there.
     """
-    along = height_of(xyz, i, direction, offset)
+    direction, e1, e2, width = cut.direction, cut.e1, cut.e2, cut.width
+    along = height_of(xyz, i, direction, cut.offset)
     index = np.int64(math.floor(along / width))
     h = along - (index + 0.5) * width
     across = 1.0 - nd * nd
@@ -43,29 +92,41 @@ def carry_point(xyz, normals, i, nd, direction, e1, e2, width, offset):
 
 @njit(cache=True, nogil=True)
 def slope_to(normals, i, direction):
-    """Cosine between a normal and the stack's direction; nan where there is no normal."""
+    """Return the cosine between a normal and a stack's direction; nan where there is no normal.
+
+    Parameters
+    ----------
+    normals (n, 3) : unit normals
+    i : index of the point
+    direction (3,) : unit vector
+    """
     return (
         normals[i, 0] * direction[0] + normals[i, 1] * direction[1] + normals[i, 2] * direction[2]
     )
 
 
 @njit(cache=True, nogil=True)
-def find_profiles(
-    xyz, normals, spacing, start, stop, direction, width, offset, max_slope, min_spacing, profile
-):
-    """Write the profile of each of the points start … stop; return the lowest and the highest.
+def find_profiles(xyz, normals, spacing, start, stop, cut, max_slope, min_spacing, profile):
+    """Write the profile of each of some points; return the lowest and the highest.
 
-    `NOT_CUT` is written for points whose surface the stack cuts too obliquely
-    (|n·d| ≥ `max_slope`), or that are closer to their neighbours than `min_spacing`.
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals, nan where not known
+    spacing (n,) : distance to neighbours, metres
+    start, stop : range of points
+    cut : StackCut
+    max_slope : |n·d| from which a surface is cut too obliquely
+    min_spacing : of points that join, metres
+    profile (n,) : filled; `NOT_CUT` for points that do not join
     """
     low, high = np.int64(2**31), np.int64(-(2**31))
     for i in range(start, stop):
-        nd = slope_to(normals, i, direction)
+        nd = slope_to(normals, i, cut.direction)
         # Also where the normal or the spacing is nan.
         if not (abs(nd) < max_slope and spacing[i] >= min_spacing):
             profile[i] = NOT_CUT
             continue
-        place = math.floor(height_of(xyz, i, direction, offset) / width)
+        place = math.floor(height_of(xyz, i, cut.direction, cut.offset) / cut.width)
         if not abs(place) < MOST_PROFILES:
             profile[i] = NOT_CUT
             continue
@@ -76,18 +137,22 @@ def find_profiles(
 
 
 @njit(cache=True, nogil=True)
-def carry_to_mid_planes(
-    xyz, normals, points, direction, e1, e2, width, offset, profile, uv, normals_uvd
-):
-    """Carry each of the `points` to the mid-plane of its profile.
+def carry_to_mid_planes(xyz, normals, points, cut, profile, uv, normals_uvd):
+    """Carry points to the mid-planes of their profiles.
 
-    Writes the profile's index, the position in the plane (e1, e2), and the normal in (e1,
-    e2, direction).
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals
+    points (m,) : indices of those that join the stack
+    cut : StackCut
+    profile (m,) : filled with the profile of each
+    uv (m, 2) : filled with the position in its plane, metres
+    normals_uvd (m, 3) : filled with the normal in (e1, e2, direction)
     """
     for row in range(points.shape[0]):
         i = points[row]
-        nd = slope_to(normals, i, direction)
-        index, u, v, mu, mv = carry_point(xyz, normals, i, nd, direction, e1, e2, width, offset)
+        nd = slope_to(normals, i, cut.direction)
+        index, u, v, mu, mv = carry_point(xyz, normals, i, nd, cut)
         profile[row] = index
         uv[row, 0], uv[row, 1] = u, v
         normals_uvd[row, 0], normals_uvd[row, 1], normals_uvd[row, 2] = mu, mv, nd
@@ -95,10 +160,20 @@ def carry_to_mid_planes(
 
 @njit(cache=True, nogil=True)
 def sort_by_cell(profile, uv, cell, margin):
-    """Order points by profile and by cell within it, row by row; also their keys and n_v.
+    """Return the order of points by profile and by cell within it, their keys, and n_v.
 
-    Points come profile by profile. Cells count from the local zero: a part of the cloud is
-    sorted as the whole is. Between rows there are `margin` empty cells.
+    Cells count from the local zero: a part of the cloud is sorted as the whole is.
+
+    Parameters
+    ----------
+    profile (n,) : of each point, ascending
+    uv (n, 2) : positions in the plane, metres
+    cell : edge of a cell, metres
+    margin : empty cells between rows
+
+    Returns
+    -------
+    Order, keys in that order, and the number of cells to a row.
     """
     n = profile.shape[0]
     low_u = low_v = np.int64(2**62)
@@ -119,35 +194,23 @@ def sort_by_cell(profile, uv, cell, margin):
 
 
 @njit(cache=True, nogil=True)
-def find_root(parents, i):
-    """Root of `i`, halving paths on the way."""
-    while parents[i] != i:
-        parents[i] = parents[parents[i]]
-        i = parents[i]
-    return i
+def are_joined(du, dv, nu1, nv1, nu2, nv2, reach, smoothness):
+    """Return whether two neighbours lie on one smooth curve.
 
+    Their normals differ by less than the corner angle, and their chord is perpendicular to the
+    bisector of the normals, as it is on every circle, within a tolerance.
 
-@njit(cache=True, nogil=True)
-def unite(parents, i, j):
-    """Unite the sets of `i` and `j`; the smaller root stays."""
-    a, b = find_root(parents, i), find_root(parents, j)
-    if a < b:
-        parents[b] = a
-    elif b < a:
-        parents[a] = b
-
-
-@njit(cache=True, nogil=True)
-def are_joined(du, dv, nu1, nv1, nu2, nv2, reach, cos_corner, offset, slope):
-    """Whether two neighbours lie on one smooth curve.
-
-    They are within `reach`, their normals differ by less than the corner angle, and
-    their chord is perpendicular to the bisector of the normals, as it is on every
-    circle, but for `offset` + `slope` · chord. With `cos_corner` < 0 nearness is enough.
+    Parameters
+    ----------
+    du, dv : chord, metres
+    nu1, nv1, nu2, nv2 : normals in the plane, of any length and sign
+    reach : longest chord, metres
+    smoothness : Smoothness
     """
     c2 = du * du + dv * dv
     if c2 > reach * reach:
         return False
+    cos_corner = smoothness.cos_corner
     if cos_corner < 0.0:
         return True
     scale = math.sqrt((nu1 * nu1 + nv1 * nv1) / (nu2 * nu2 + nv2 * nv2))
@@ -158,18 +221,23 @@ def are_joined(du, dv, nu1, nv1, nu2, nv2, reach, cos_corner, offset, slope):
         return False
     bu, bv = nu1 + nu2, nv1 + nv2
     off = abs(du * bu + dv * bv) / math.sqrt(bu * bu + bv * bv)
-    return off <= offset + slope * math.sqrt(c2)
+    return off <= smoothness.offset + smoothness.slope * math.sqrt(c2)
 
 
 @njit(cache=True, nogil=True)
-def join_neighbours(
-    keys, n_v, cell, uv, normals_uvd, reach, cos_corner, offset, slope, start, stop, parents
-):
-    """Unite neighbouring points start … stop that lie on one curve.
+def join_neighbours(keys, n_v, cell, uv, normals_uvd, reach, smoothness, start, stop, parents):
+    """Unite neighbouring points that lie on one curve.
 
-    Points are sorted by `keys`, which number the cells of all profiles row by row;
-    start and stop lie between profiles. `reach` holds each point's largest gap, at least
-    `cell`; a pair joins within the larger of its two.
+    Parameters
+    ----------
+    keys (n,) : number of each point's cell, ascending
+    n_v : number of cells to a row
+    cell : edge of a cell, metres
+    uv (n, 2), normals_uvd (n, 3) : positions, metres, and normals
+    reach (n,) : largest gap of each point, at least `cell`; a pair joins within the larger
+    smoothness : Smoothness
+    start, stop : range of points, which lies between profiles
+    parents (n,) : disjoint sets; filled with roots
     """
     most_rows = 1
     for i in range(start, stop):
@@ -205,9 +273,7 @@ def join_neighbours(
                         normals_uvd[j, 0],
                         normals_uvd[j, 1],
                         reach[i],
-                        cos_corner,
-                        offset,
-                        slope,
+                        smoothness,
                     )
                 ):
                     unite(parents, i, j)
@@ -218,7 +284,13 @@ def join_neighbours(
 
 @njit(cache=True, nogil=True)
 def gather(points, uv, normals_uvd, profile, members, starts):
-    """Points, positions and normals of the members, and the profile of each group."""
+    """Return points, positions and normals of members, and the profile of each group.
+
+    Parameters
+    ----------
+    points (n,), uv (n, 2), normals_uvd (n, 3), profile (n,) : of all points
+    members (m,), starts (g + 1,) : the members group by group, and where each begins
+    """
     n = members.shape[0]
     of = np.empty(n, np.int32)
     places, vectors = np.empty((n, 2)), np.empty((n, 3))

@@ -3,14 +3,20 @@
 import numpy as np
 import pytest
 
-from pipecore._kernels import arcs, draws, lines
+from pipecore._kernels import arc_search, line_search, random_draws
+from pipecore._kernels.line_search import AxisEllipses, PieceLimits
 from pipecore.geometry import ArcAxis, LineAxis
 from tests.core.shapes import random_direction, random_rotation
 
 # Random numbers wrap around on purpose, which plain numpy warns of.
 pytestmark = [pytest.mark.kernels, pytest.mark.filterwarnings("ignore:overflow encountered")]
 
-MIN_COS = np.cos(np.radians(12.0))
+LIMITS = PieceLimits(np.cos(np.radians(12.0)), 0.06, 0.06)
+
+
+def ellipses(*columns):
+    """Ellipses as the kernels take them."""
+    return AxisEllipses(*(np.atleast_1d(column) for column in columns))
 
 
 def test_that_an_ellipse_is_on_a_line_if_place_direction_and_radius_agree(rng):
@@ -25,10 +31,9 @@ def test_that_an_ellipse_is_on_a_line_if_place_direction_and_radius_agree(rng):
         r = expected * (1 + rng.uniform(-0.12, 0.12))
         axis = np.cos(tilt) * line.direction + np.sin(tilt) * right
         axis *= rng.choice([-1, 1])
-        found = lines.on_line(
-            *(line.at(s) + off * up), *axis, r, sd, *line.start, *line.direction,
-            radius, slope, MIN_COS, 0.06, 0.06,
-        )  # fmt: skip
+        one = ellipses([line.at(s) + off * up], [axis], r, sd)
+        numbers = np.array([*line.start, *line.direction, radius, slope])
+        found = line_search.on_line(one, 0, numbers, LIMITS)
         true = (
             tilt <= np.radians(12.0)
             and abs(r - expected) <= 0.06 * expected + 2 * sd
@@ -50,10 +55,9 @@ def test_that_an_ellipse_is_on_an_arc_if_place_direction_and_radius_agree(rng):
         off = rng.uniform(0, 0.02)
         r = radius * (1 + rng.uniform(-0.12, 0.12))
         axis = np.cos(tilt) * arc.tangent(s) + np.sin(tilt) * up
-        found = arcs.on_arc(
-            *(arc.at(s) + off * up), *axis, r, sd, *arc.centre, *arc.normal, 0.3, radius,
-            MIN_COS, 0.06, 0.06,
-        )  # fmt: skip
+        one = ellipses([arc.at(s) + off * up], [axis], r, sd)
+        numbers = np.array([*arc.centre, *arc.normal, 0.3, radius])
+        found = arc_search.on_arc(one, 0, numbers, LIMITS)
         true = (
             tilt <= np.radians(12.0)
             and abs(r - radius) <= 0.06 * radius + 2 * sd
@@ -81,9 +85,9 @@ def test_that_the_line_with_most_ellipses_is_found_among_strays(rng, slope):
     planted = line.at(s), np.tile(line.direction, (25, 1)), 0.1 + slope * s
     centre, axis, radius = both(planted, scattered(rng, 15))
     inliers = np.empty(40, np.bool_)
-    count = lines.best_line(
-        centre, axis, radius, np.full(40, 1e-4), np.ones(40, np.bool_), 150, bool(slope),
-        MIN_COS, 0.06, 0.06, inliers,
+    count = line_search.best_line(
+        ellipses(centre, axis, radius, np.full(40, 1e-4)), np.ones(40, np.bool_), 150,
+        bool(slope), LIMITS, inliers,
     )  # fmt: skip
     assert count == inliers.sum()
     assert inliers[:25].all()
@@ -97,9 +101,9 @@ def test_that_the_arc_with_most_ellipses_is_found_with_its_centre_and_bend_radiu
     planted = bend.at(s), np.array(bend.tangent(s)), np.full(25, 0.1)
     centre, axis, radius = both(planted, scattered(rng, 15))
     inliers, arc = np.empty(40, np.bool_), np.empty(8)
-    count = arcs.best_arc(
-        centre, axis, radius, np.full(40, 1e-4), np.ones(40, np.bool_), 300,
-        MIN_COS, 0.06, 0.06, inliers, arc,
+    count = arc_search.best_arc(
+        ellipses(centre, axis, radius, np.full(40, 1e-4)), np.ones(40, np.bool_), 300, LIMITS,
+        inliers, arc,
     )  # fmt: skip
     assert count == inliers.sum()
     assert inliers[:25].all()
@@ -112,9 +116,9 @@ def test_that_taken_ellipses_are_not_found_again(rng):
     line = LineAxis(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.6)
     centre, axis = line.at(np.linspace(0, 0.6, 10)), np.tile(line.direction, (10, 1))
     inliers, none_free = np.empty(10, np.bool_), np.zeros(10, np.bool_)
-    args = centre, axis, np.full(10, 0.1), np.full(10, 1e-4), none_free, 50
-    assert lines.best_line(*args, False, MIN_COS, 0.06, 0.06, inliers) == 0
-    assert arcs.best_arc(*args, MIN_COS, 0.06, 0.06, inliers, np.empty(8)) == 0
+    args = ellipses(centre, axis, np.full(10, 0.1), np.full(10, 1e-4)), none_free, 50
+    assert line_search.best_line(*args, False, LIMITS, inliers) == 0
+    assert arc_search.best_arc(*args, LIMITS, inliers, np.empty(8)) == 0
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.25])
@@ -126,13 +130,12 @@ def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng,
         for line, x in zip(pipes, s, strict=True)
     ]
     centre, axis, radius = both(both(*planted), scattered(rng, 15))
-    limits = MIN_COS, 0.06, 0.06, 0.025, 0.04
     piece = np.empty(75, np.int32)
 
     def take(is_tapered, min_length):
-        return lines.take_lines(
-            centre, axis, radius, np.full(75, 1e-4), 300, is_tapered, limits, 0.02, min_length,
-            5, piece,
+        return line_search.take_lines(
+            ellipses(centre, axis, radius, np.full(75, 1e-4)), 300, is_tapered,
+            LIMITS._replace(min_length=min_length), 0.02, piece,
         )  # fmt: skip
 
     found = take(bool(slope), 0.5)
@@ -157,23 +160,23 @@ def test_that_straight_pieces_are_taken_with_their_radii_extents_and_tapers(rng,
 def test_that_the_longest_part_is_that_with_most_entries_and_no_gap(rng):
     along = np.concatenate([np.linspace(0, 1, 11), np.linspace(1.5, 2, 21), np.linspace(3, 5, 5)])
     order = rng.permutation(len(along))
-    part = lines.longest_part(along[order], 0.3)
+    part = line_search.longest_part(along[order], 0.3)
     assert along[order][part].tolist() == along[11:32].tolist()
-    assert len(lines.longest_part(along[order], 1.1)) == len(along)
+    assert len(line_search.longest_part(along[order], 1.1)) == len(along)
 
 
 def test_that_half_of_the_weight_is_below_the_weighted_median(rng):
     values, weights = rng.normal(size=41), rng.uniform(0.1, 2, 41)
-    median = lines.weighted_median(values, weights)
+    median = line_search.weighted_median(values, weights)
     assert weights[values < median].sum() < weights.sum() / 2 <= weights[values <= median].sum()
 
 
-@pytest.mark.parametrize("draw", [draws.draw, draws.draw_fast])
+@pytest.mark.parametrize("draw", [random_draws.draw, random_draws.draw_fast])
 def test_that_draws_are_below_their_bound_and_even(draw):
-    state = draws.seeded(5)
+    state = random_draws.seeded(5)
     counts = np.zeros(7, int)
     for _ in range(7000):
         state, i = draw(state, 7)
         counts[i] += 1
     assert abs(counts - 1000).max() < 150
-    assert draws.seeded(5) != draws.seeded(6)
+    assert random_draws.seeded(5) != random_draws.seeded(6)

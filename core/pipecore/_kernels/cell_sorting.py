@@ -8,12 +8,19 @@ import numpy as np
 from numba import njit
 
 from pipecore._kernels.grouping import argsort_keys
-from pipecore._kernels.voxels import voxel_key
+from pipecore._kernels.voxel_hash import voxel_key
 
 
 @njit(cache=True, nogil=True)
 def find_bounds(xyz, start, stop, corners):
-    """Write the lowest and the highest coordinates of the points start … stop."""
+    """Write the lowest and the highest coordinates of some points.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    start, stop : range of points
+    corners (2, 3) : filled
+    """
     x, y, z = xyz[start, 0], xyz[start, 1], xyz[start, 2]
     low_x, low_y, low_z = x, y, z
     high_x, high_y, high_z = x, y, z
@@ -26,33 +33,61 @@ def find_bounds(xyz, start, stop, corners):
 
 
 @njit(cache=True, nogil=True)
-def count_bins(xyz, start, stop, first, edge, n_y, n_z, shift, counts):
-    """Count the points start … stop whose cells' numbers share all but the `shift` last bits."""
+def count_bins(xyz, start, stop, frame, shift, counts):
+    """Count the points whose cells' numbers share all but their last bits.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    start, stop : range of points
+    frame : VoxelFrame
+    shift : number of last bits
+    counts (b,) : added to
+    """
     for i in range(start, stop):
-        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], frame)
         counts[key >> shift] += 1
 
 
 @njit(cache=True, nogil=True)
-def put_in_buckets(xyz, start, stop, first, edge, n_y, n_z, shift, bucket_of_bin, places, order):
-    """Write the points start … stop to their buckets' next `places`, which go on."""
+def put_in_buckets(xyz, start, stop, frame, shift, bucket_of_bin, places, order):
+    """Write the indices of points into their buckets.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    start, stop : range of points
+    frame : VoxelFrame
+    shift : number of last bits that cells of one bin differ in
+    bucket_of_bin (b,) : bucket of each bin
+    places (buckets,) : next place of each bucket in `order`; moved on
+    order (n,) : filled
+    """
     for i in range(start, stop):
-        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        key = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], frame)
         bucket = bucket_of_bin[key >> shift]
         order[places[bucket]] = i
         places[bucket] += 1
 
 
 @njit(cache=True, nogil=True)
-def sort_bucket(xyz, first, edge, n_y, n_z, order, begins):
-    """Sort the points that `order` lists by their cells, stably; mark where each cell begins."""
+def sort_bucket(xyz, frame, order, begins):
+    """Sort points by their cells, stably, and mark where each cell begins.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    frame : VoxelFrame
+    order (m,) : indices of points; sorted in place
+    begins (m,) : filled
+    """
     n = order.shape[0]
     if n == 0:
         return
     keys = np.empty(n, np.int64)
     for k in range(n):
         i = order[k]
-        keys[k] = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], first, edge, n_y, n_z)
+        keys[k] = voxel_key(xyz[i, 0], xyz[i, 1], xyz[i, 2], frame)
     sorted_rows = argsort_keys(keys - keys.min())
     points = order.copy()
     before = np.int64(0)
@@ -65,7 +100,15 @@ def sort_bucket(xyz, first, edge, n_y, n_z, order, begins):
 
 @njit(cache=True, nogil=True)
 def take_points(xyz, order, start, stop, taken):
-    """Write the points that `order` lists from start to stop."""
+    """Write points in a given order.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    order (n,) : indices of points
+    start, stop : range within `order`
+    taken (n, 3) : filled
+    """
     for k in range(start, stop):
         i = order[k]
         taken[k, 0], taken[k, 1], taken[k, 2] = xyz[i, 0], xyz[i, 1], xyz[i, 2]
@@ -73,9 +116,16 @@ def take_points(xyz, order, start, stop, taken):
 
 @njit(cache=True, nogil=True)
 def mean_points(xyz, order, starts, first, last, means):
-    """Write the means of the points of cells first … last, which `order` lists cell by cell.
+    """Write the means of the points of cells.
 
     Points are added up in whole micrometres, so that their order does not matter.
+
+    Parameters
+    ----------
+    xyz (n, 3) : points, metres
+    order (n,), starts (c + 1,) : the points cell by cell, and where each cell begins
+    first, last : range of cells
+    means (c, 3) : filled
     """
     for c in range(first, last):
         x = y = z = np.int64(0)

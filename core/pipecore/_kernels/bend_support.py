@@ -5,17 +5,22 @@ import math
 import numpy as np
 from numba import njit
 
-from pipecore._kernels.surfaces import CYLINDER, MOST_PARAMETERS, TORUS, at_point
+from pipecore._kernels.surface_models import CYLINDER, MOST_PARAMETERS, TORUS, at_point
 
 
 @njit(cache=True, nogil=True)
 def agreement(xyz, normals, tori, lines, tangents, tolerance, min_cos, counts):
     """Count the points that agree with straight, bend and straight as one pipe.
 
-    `lines` (2, 14) are the straights, directed towards the corner where their middles lie;
-    `tori` (m, 14) the bends tried, which begin at `tangents` (m,) before the corner. Writes
-    to `counts` (m, 2) the points within `tolerance` of each pipe with normals like its own,
-    and those of them that are abreast of the bend.
+    Parameters
+    ----------
+    xyz, normals (n, 3) : points, metres, and unit normals of either sign
+    tori (m, 14) : the bends tried, see `surface_models`
+    lines (2, 14) : the straights, directed to the corner where their middles lie
+    tangents (m,) : distance of each bend's tangent points from the corner, metres
+    tolerance : largest distance from the surface, metres
+    min_cos : least cosine between normals
+    counts (m, 2) : filled with all points that agree, and those abreast of the bend
     """
     row = np.empty(MOST_PARAMETERS)
     counts[:, :] = 0
@@ -43,14 +48,26 @@ def agreement(xyz, normals, tori, lines, tangents, tolerance, min_cos, counts):
 
 @njit(cache=True, nogil=True)
 def best_follower(
-    place, normal, starts, bend_radii, cosines, sines, tolerance, min_cos, max_angle, ahead
+    place, normal, starts, bend_radii, cosines, sines, tolerance, min_cos, max_angle, max_length
 ):
-    """Find the bend, of those that may follow a straight, that most points are on.
+    """Find the bend that may follow a straight and has most points on it.
 
-    Points and normals (3, n) are seen from the straight's end: along it and across, in its
-    radii. A bend has one of the `starts`, of the `bend_radii` and of the azimuths, in the
-    order of which the first counts where several are as good, and ends at `max_angle` or a
-    length of `ahead`. Returns the number of points and three indices.
+    Of bends with equally many points the first in the order of the candidates counts.
+
+    Parameters
+    ----------
+    place, normal (3, n) : along the straight from its end and across it, in its radii
+    starts (a,) : candidate starts of the bend, radii
+    bend_radii (b,) : candidate bend radii, radii
+    cosines, sines (c,) : of candidate azimuths
+    tolerance : largest distance from the surface, radii
+    min_cos : least cosine between normals
+    max_angle : largest bend angle, radians
+    max_length : largest length of the bend, radii
+
+    Returns
+    -------
+    Number of points, and indices of start, bend radius and azimuth.
     """
     best, best_start, best_radius, best_azimuth = -1, 0, 0, 0
     n = place.shape[1]
@@ -58,7 +75,7 @@ def best_follower(
         for j in range(bend_radii.shape[0]):
             bend = bend_radii[j]
             # Angles below a limit (< π) are those of larger cosines.
-            least_cos = math.cos(min(max_angle, ahead / bend))
+            least_cos = math.cos(min(max_angle, max_length / bend))
             for k in range(cosines.shape[0]):
                 cos, sin = cosines[k], sines[k]
                 count = 0

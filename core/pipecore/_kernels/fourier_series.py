@@ -1,16 +1,49 @@
 """Fourier series through the points of a section: robust fit, choice of order, curvature."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from pipecore._kernels.linear import solve_in_place
+from pipecore.robust import MAD_TO_SD
+
+
+class SeriesLimits(NamedTuple):
+    """What a section has to be for a fit, and how outliers are found.
+
+    points_per_parameter: least number of points for each parameter;
+    min_span: shortest span between gaps that counts, radians;
+    min_arc: least arc of all spans, radians;
+    max_points: number of points from which means over cells are taken;
+    n_cells: number of these cells over the full turn;
+    n_rounds: of reweighting;
+    tukey: reach of Tukey's weights, standard deviations;
+    outlying: residual from which a point is an outlier, standard deviations.
+    """
+
+    points_per_parameter: int
+    min_span: float
+    min_arc: float
+    max_points: int
+    n_cells: int
+    n_rounds: int
+    tukey: float
+    outlying: float
 
 
 @njit(cache=True, nogil=True)
 def write_terms(theta, order, derivative, terms):
-    """Write 1, cos θ, sin θ, cos 2θ … (2·order + 1,) at an angle, or their derivative."""
+    """Write 1, cos θ, sin θ, cos 2θ … at an angle, or their derivative.
+
+    Parameters
+    ----------
+    theta : radians
+    order : highest multiple
+    derivative : 0, 1 or 2
+    terms (2 · order + 1,) : filled
+    """
     terms[0] = 0.0 if derivative else 1.0
     cos_1, sin_1 = math.cos(theta), math.sin(theta)
     cos, sin = 1.0, 0.0
@@ -24,9 +57,15 @@ def write_terms(theta, order, derivative, terms):
 
 @njit(cache=True, nogil=True)
 def write_normal(moments, order, normal):
-    """Write Σ w b bᵀ of the terms b up to an order, below the diagonal, from Σ w of twice as many.
+    """Write Σ w b bᵀ of the terms b below and on the diagonal, from sums over single terms.
 
-    2 cos a cos b = cos(a - b) + cos(a + b), and so on.
+    By 2 cos a cos b = cos(a - b) + cos(a + b), and so on.
+
+    Parameters
+    ----------
+    moments (4 · order + 1,) : Σ w of the terms up to twice the order
+    order : highest multiple
+    normal (p, p) : filled, p = 2 · order + 1
     """
     normal[0, 0] = moments[0]
     for a in range(1, order + 1):
@@ -43,10 +82,18 @@ def write_normal(moments, order, normal):
 
 
 @njit(cache=True, nogil=True)
-def find_strays(waves, r, weight, n_rounds, tukey):
-    """Residuals from a robust fit in units of their noise, and how wide they scatter.
+def find_outliers(waves, r, weight, n_rounds, tukey):
+    """Return absolute residuals from a robust fit, and their robust standard deviation.
 
-    `waves` are the terms up to twice the order of the fit.
+    Residuals are in the unit of r times the root of the weight.
+
+    Parameters
+    ----------
+    waves (n, 4 · order + 1) : terms of each point up to twice the order of the fit
+    r (n,) : metres
+    weight (n,) : of each point
+    n_rounds : of reweighting
+    tukey : reach of Tukey's weights, standard deviations
     """
     n = r.shape[0]
     order = (waves.shape[1] - 1) // 4
@@ -76,7 +123,7 @@ def find_strays(waves, r, weight, n_rounds, tukey):
             for k in range(p):
                 fitted += waves[i, k] * right[k]
             residual[i] = abs(r[i] - fitted) * math.sqrt(weight[i])
-        scale = max(1.4826 * np.median(residual) / math.sqrt(freedom), 1e-12)
+        scale = max(MAD_TO_SD * np.median(residual) / math.sqrt(freedom), 1e-12)
         for i in range(n):
             t = residual[i] / (tukey * scale)
             robust[i] = max(1.0 - t * t, 1e-6) ** 2
@@ -85,7 +132,12 @@ def find_strays(waves, r, weight, n_rounds, tukey):
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
 def inner(a, b):
-    """Sum of products, in whatever order is fast."""
+    """Return the inner product of two vectors, summed in any order.
+
+    Parameters
+    ----------
+    a, b (n,) : vectors
+    """
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]
@@ -94,9 +146,14 @@ def inner(a, b):
 
 @njit(cache=True, nogil=True)
 def orthogonalise(rest, upper):
-    """Write the triangle R of a = Q R and, as its last column, Qᵀ b; `rest` is [a, b]ᵀ and lost.
+    """Write the triangle R of a = Q R and, as its last column, Qᵀb.
 
     Modified Gram-Schmidt, stable with b taken along.
+
+    Parameters
+    ----------
+    rest (p + 1, n) : [a, b]ᵀ; overwritten
+    upper (p, p + 1) : filled
     """
     n, p = rest.shape[1], rest.shape[0] - 1
     upper[:, :] = 0.0
@@ -115,9 +172,16 @@ def orthogonalise(rest, upper):
 
 @njit(cache=True, nogil=True)
 def curvature(theta, coefficients, root, values, variances):
-    """Write the curvature of a series at angles and its variance, 1/metres; return the mean radius.
+    """Write the curvature of a series at angles and its variance; return the mean radius, metres.
 
-    (r² + 2r′² - r r″) / (r² + r′²)^{3/2}; by far the most of its variance is that of r″.
+    (r² + 2r′² − r r″) / (r² + r′²)^{3/2}. Of its variance only that of r″ counts, by far the most.
+
+    Parameters
+    ----------
+    theta (n,) : radians
+    coefficients (p,) : metres
+    root (p, p) : root of their covariance
+    values, variances (n,) : filled, 1/metres and 1/metres²
     """
     p = coefficients.shape[0]
     order = (p - 1) // 2
@@ -146,9 +210,14 @@ def curvature(theta, coefficients, root, values, variances):
 
 @njit(cache=True, nogil=True)
 def spans_of(ordered, max_gap, least, spans):
-    """Write the arcs between gaps wider than `max_gap` of angles in order; return how many.
+    """Write the arcs between wide gaps of angles; return how many.
 
-    Arcs no longer than `least` do not count. Where there is no gap it is a full turn.
+    Parameters
+    ----------
+    ordered (n,) : angles, ascending, radians
+    max_gap : widest gap within an arc, radians
+    least : arcs no longer than this do not count, radians
+    spans (m, 2) : filled with start and end, a full turn where there is no gap
     """
     n = ordered.shape[0]
     n_gaps, last = 0, 0
@@ -176,7 +245,17 @@ def spans_of(ordered, max_gap, least, spans):
 
 @njit(cache=True, nogil=True)
 def in_cells(theta, r, n_cells):
-    """Mean angle and radius of cells that hold points, their counts, and what they hide."""
+    """Return mean angle and radius of equal cells that hold points, and what the means hide.
+
+    Parameters
+    ----------
+    theta, r (n,) : radians, in 0 … 2π, and metres
+    n_cells : number of cells over a full turn
+
+    Returns
+    -------
+    Means (m,) of angle and radius, counts (m,), and the sum of squares within cells, metres².
+    """
     count = np.zeros(n_cells)
     middle, mean = np.zeros(n_cells), np.zeros(n_cells)
     squares = 0.0
@@ -197,10 +276,15 @@ def in_cells(theta, r, n_cells):
 
 @njit(cache=True, nogil=True)
 def choose_order(rest, n_points, within, aic, upper):
-    """Least order by Akaike's criterion (corrected for few points), and what it leaves.
+    """Return the order with the least AIC, corrected for few points, and its sum of squares.
 
-    `rest` holds a row for each term and one for the values, times the roots of the weights, and
-    is lost; `upper` becomes the triangle of `orthogonalise`. Writes the criterion of each order.
+    Parameters
+    ----------
+    rest (p + 1, n) : each term, and the values, times the roots of the weights; overwritten
+    n_points : number of points
+    within : sum of squares within cells, metres²
+    aic (orders,) : filled with the criterion of each order
+    upper (p, p + 1) : filled as by `orthogonalise`
     """
     p = rest.shape[0] - 1
     whole = inner(rest[p], rest[p])
@@ -221,7 +305,13 @@ def choose_order(rest, n_points, within, aic, upper):
 
 @njit(cache=True, nogil=True)
 def inverted(upper, size):
-    """Inverse of a triangle's first rows and columns, from its last row up."""
+    """Return the inverse of the first rows and columns of an upper triangle.
+
+    Parameters
+    ----------
+    upper (p, p or more) : the triangle
+    size : number of rows
+    """
     inverse = np.zeros((size, size))
     for i in range(size - 1, -1, -1):
         for j in range(i, size):
@@ -234,7 +324,14 @@ def inverted(upper, size):
 
 @njit(cache=True, nogil=True)
 def curvature_variation(theta, coefficients, root):
-    """How much the curvature of a series varies at angles; see `SectionCurve`."""
+    """Return how much the curvature of a series varies; see `SectionCurve`.
+
+    Parameters
+    ----------
+    theta (n,) : angles at which it is taken, radians
+    coefficients (p,) : metres
+    root (p, p) : root of their covariance
+    """
     values, variances = np.empty(theta.shape[0]), np.empty(theta.shape[0])
     radius = curvature(theta, coefficients, root, values, variances)
     total = mean = 0.0
@@ -252,34 +349,39 @@ def curvature_variation(theta, coefficients, root):
 
 @njit(cache=True, nogil=True)
 def fit_series(theta, r, max_order, max_gap, limits):
-    """Fit a series to points in polar form, of the order that the criterion chooses.
+    """Fit a series to points in polar form, of the order with the least AIC.
 
-    `limits` are the points for each parameter, the shortest span that counts, the least arc
-    of all, the points from which on cells are taken, their number, and the rounds, Tukey's
-    reach and the reach in units of the noise by which strays are found. Returns the spans
-    (k, 2), how many points are no strays, the criterion of each order, the noise, the
-    coefficients and the root of their covariance; none of these for too short an arc.
+    Parameters
+    ----------
+    theta, r (n,) : radians, in 0 … 2π, and metres
+    max_order : highest order
+    max_gap : widest gap between neighbouring points that is not left open, radians
+    limits : SeriesLimits
+
+    Returns
+    -------
+    Spans (k, 2), number of points without outliers, AIC of each order, noise, coefficients and
+    the root of their covariance; these are empty where the arc is too short.
     """
-    per_parameter, least_span, least_arc, max_points, n_cells, n_rounds, tukey, outlying = limits
     n = theta.shape[0]
     spans = np.empty((n, 2))
-    spans = spans[: spans_of(np.sort(theta), max_gap, least_span, spans)]
+    spans = spans[: spans_of(np.sort(theta), max_gap, limits.min_span, spans)]
     arc = 0.0
     for k in range(spans.shape[0]):
         arc += spans[k, 1] - spans[k, 0]
-    if arc < least_arc:
+    if arc < limits.min_arc:
         return spans, 0, np.empty(0), math.nan, np.empty(0), np.empty((0, 0))
-    order = min(max_order, (n // per_parameter - 1) // 2)
+    order = min(max_order, (n // limits.points_per_parameter - 1) // 2)
     weight, within = np.ones(n), 0.0
-    if n > max_points:
-        theta, r, weight, within = in_cells(theta, r, n_cells)
+    if n > limits.max_points:
+        theta, r, weight, within = in_cells(theta, r, limits.n_cells)
     n, p = theta.shape[0], 2 * order + 1
     waves = np.empty((n, 4 * order + 1))
     for i in range(n):
         write_terms(theta[i], 2 * order, 0, waves[i])
-    residual, scale = find_strays(waves, r, weight, n_rounds, tukey)
+    residual, scale = find_outliers(waves, r, weight, limits.n_rounds, limits.tukey)
     # Weights that bend the tails of the noise would make it look smaller: all or nothing.
-    kept = np.flatnonzero(residual < outlying * scale)
+    kept = np.flatnonzero(residual < limits.outlying * scale)
     rest, n_points = np.empty((p + 1, kept.shape[0])), 0.0
     for j in range(kept.shape[0]):
         i = kept[j]
@@ -302,7 +404,13 @@ def fit_series(theta, r, max_order, max_gap, limits):
 
 @njit(cache=True, nogil=True)
 def clocks_of(spans, step):
-    """Angles from end to end of every span, no further than `step` apart."""
+    """Return angles from end to end of every span.
+
+    Parameters
+    ----------
+    spans (k, 2) : start and end, radians
+    step : largest distance between angles, radians
+    """
     n = 0
     for k in range(spans.shape[0]):
         n += max(2, math.ceil((spans[k, 1] - spans[k, 0]) / step) + 1)
@@ -319,9 +427,16 @@ def clocks_of(spans, step):
 
 @njit(cache=True, nogil=True)
 def variations(theta, r, first, last, least_points, max_order, max_gap, limits, step, variation):
-    """Write how much the curvature varies around each section; nan where it carries no curve.
+    """Write how much the curvature varies around each of many sections.
 
-    A section has the points from `first` to `last`.
+    Parameters
+    ----------
+    theta, r (n,) : radians, in 0 … 2π, and metres
+    first, last (m,) : range of points of each section
+    least_points : least number of points
+    max_order, max_gap, limits : as in `fit_series`
+    step : largest distance between angles where the curvature is taken, radians
+    variation (m,) : filled; nan where the points define no curve
     """
     for row in range(first.shape[0]):
         a, b = first[row], last[row]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore._kernels import unrolled
+from pipecore._kernels import unrolling
 from pipecore.geometry import ArcAxis, LineAxis, cross, unit
 
 pytestmark = pytest.mark.kernels
@@ -24,7 +24,7 @@ def test_that_points_are_unrolled_as_the_axes_say(rng, slope):
         normals /= np.linalg.norm(normals, axis=1)[:, None]
         normals[7] = np.nan
         s, rho, clock, height, alignment = np.empty((5, 50))
-        unrolled.unroll(axis.numbers, 0.08, slope, xyz, normals, s, rho, clock, height, alignment)
+        unrolling.unroll(axis.numbers, 0.08, slope, xyz, normals, s, rho, clock, height, alignment)
         for found, expected in zip((s, rho, clock), axis.pipe_coordinates(xyz), strict=True):
             assert_allclose(found, expected, atol=1e-12)
         assert_allclose(height, (rho - 0.08 - slope * s) / np.hypot(1, slope), atol=1e-12)
@@ -38,7 +38,7 @@ def test_that_a_point_on_the_axis_faces_nothing(rng):
     for axis in axes(rng):
         places = axis.at(np.array([0.3]))
         s, rho, clock, height, alignment = np.empty((5, 1))
-        unrolled.unroll(
+        unrolling.unroll(
             axis.numbers, 0.08, 0.0, places, np.ones((1, 3)), s, rho, clock, height, alignment
         )
         assert_allclose((s[0], rho[0], height[0]), (0.3, 0.0, -0.08), atol=1e-9)
