@@ -9,7 +9,22 @@ from pipecore.types import NominalSize
 
 @cache
 def sizes_of(catalogue: str) -> tuple[NominalSize, ...]:
-    """Return all sizes of a catalogue, by its name such as "EN 10220"."""
+    """Return all sizes of a catalogue.
+
+    Parameters
+    ----------
+    catalogue : str
+        Its name, such as "EN 10220".
+
+    Returns
+    -------
+    tuple of NominalSize
+
+    Raises
+    ------
+    KeyError
+        If there is no such catalogue.
+    """
     for path in sorted(resource("sizes").glob("*.toml")):
         data = tomllib.loads(path.read_text(encoding="utf-8"))
         if data["name"] == catalogue:

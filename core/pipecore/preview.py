@@ -119,7 +119,20 @@ class ProfilePreview:
     n_points: int
 
     def ellipse_uv(self, row: int) -> tuple[Array, float, float, float]:
-        """Centre (2,), semi-axes and angle of the major axis from u, of one ellipse."""
+        """Return one ellipse in the profile's plane.
+
+        Parameters
+        ----------
+        row : int
+            Its row in `ellipses`.
+
+        Returns
+        -------
+        centre : ndarray, shape (2,)
+            Metres.
+        semi_major, semi_minor, angle : float
+            Metres, and radians of the major axis from u.
+        """
         ellipses = self.ellipses
         centre = self.frame[:2] @ ellipses.centre[row]
         right, up = self.frame[:2] @ ellipses.major_direction[row]

@@ -73,7 +73,17 @@ class Criterion:
     od_up_to_mm: float = np.inf
 
     def covers(self, kind: DeformationKind, element: Element) -> bool:
-        """Whether this criterion says anything about such a deformation of an element."""
+        """Return whether this criterion applies to deformations of a kind on an element.
+
+        Parameters
+        ----------
+        kind : DeformationKind
+        element : Element
+
+        Returns
+        -------
+        bool
+        """
         return (
             kind in self.kinds
             and (not self.element_kinds or element.kind in self.element_kinds)
@@ -81,7 +91,17 @@ class Criterion:
         )
 
     def value(self, deformation: Deformation, element: Element) -> tuple[float, float]:
-        """Return the limited measure and its standard deviation, in the limit's unit."""
+        """Return the limited measure and its standard deviation, in the limit's unit.
+
+        Parameters
+        ----------
+        deformation : Deformation
+        element : Element
+
+        Returns
+        -------
+        value, sd : float
+        """
         diameter = outside_diameter(element)
         scale = {
             Measure.DEPTH_MM: 1000.0,
@@ -95,7 +115,17 @@ class Criterion:
         return scale * deformation.depth, scale * deformation.depth_sd
 
     def judge(self, deformation: Deformation, element: Element) -> Verdict:
-        """Return the verdict of this criterion alone."""
+        """Return the verdict of this criterion alone.
+
+        Parameters
+        ----------
+        deformation : Deformation
+        element : Element
+
+        Returns
+        -------
+        Verdict
+        """
         value, sd = self.value(deformation, element)
         if not np.isfinite(value) or not np.isfinite(sd):
             return Verdict.NOT_MEASURABLE
@@ -132,15 +162,34 @@ class Rule:
 
 
 def outside_diameter(element: Element) -> float:
-    """Outside diameter that limits in percent refer to: the nominal one where known, metres."""
+    """Return the outside diameter that limits in percent refer to: the nominal one where known.
+
+    Parameters
+    ----------
+    element : Element
+
+    Returns
+    -------
+    float
+        Metres.
+    """
     return element.nominal.outside_diameter if element.nominal else 2 * element.radius
 
 
 def ovality_sd(deformation: Deformation) -> float:
-    """Standard deviation of a deformation's ovality, as a ratio.
+    """Return the standard deviation of a deformation's ovality, as a ratio.
 
     Depth and ovality of one stretch are the same amplitude in two forms, and so have the
     same relative uncertainty.
+
+    Parameters
+    ----------
+    deformation : Deformation
+
+    Returns
+    -------
+    float
+        nan where there is no depth.
     """
     if not deformation.depth > 0:
         return np.nan

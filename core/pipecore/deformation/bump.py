@@ -209,18 +209,52 @@ def fit_bump(
 
 
 def bump_shape(rho: Array, q: float = 1.0) -> Array:
-    """Return the height of the cosine bump, 1 at the peak and 0 from ρ = 1 on."""
+    """Return the height of the cosine bump, 1 at the peak and 0 from ρ = 1 on.
+
+    Parameters
+    ----------
+    rho : ndarray
+        Distance from the peak, fraction of the half extents.
+    q : float
+        Exponent: 1 for a plain cosine, larger for a flat bottom.
+
+    Returns
+    -------
+    ndarray, shape of rho
+    """
     t = np.minimum(rho, 1.0)
     return np.asarray(np.cos(np.pi / 2 * (t if q == 1.0 else t**q)) ** 2)
 
 
 def cone(rho: Array, _q: float = 1.0) -> Array:
-    """Return the height of a cone, 1 at the peak and 0 from ρ = 1 on."""
+    """Return the height of a cone, 1 at the peak and 0 from ρ = 1 on.
+
+    Parameters
+    ----------
+    rho : ndarray
+        Distance from the peak, fraction of the half extents.
+
+    Returns
+    -------
+    ndarray, shape of rho
+    """
     return np.asarray(1.0 - np.minimum(rho, 1.0))
 
 
 def frustum(rho: Array, q: float = 1.0) -> Array:
-    """Return the height of a frustum, flat up to ρ = q / (1 + q) and 0 from ρ = 1 on."""
+    """Return the height of a frustum, flat up to ρ = q / (1 + q) and 0 from ρ = 1 on.
+
+    Parameters
+    ----------
+    rho : ndarray
+        Distance from the peak, fraction of the half extents.
+    q : float
+        Shape; 0 for a cone.
+
+    Returns
+    -------
+    ndarray, shape of rho
+    """
     return np.asarray(np.clip((1.0 - rho) * (1.0 + q), 0.0, 1.0))
 
 

@@ -45,7 +45,17 @@ class CentreLine:
 
 
 def measure_centre_line(contour: Contour) -> CentreLine:
-    """Measure a contour fitted with a constant radius against the chord of its ends."""
+    """Measure how far the line of centres leaves the chord of its ends.
+
+    Parameters
+    ----------
+    contour : Contour
+        Fitted with a constant radius.
+
+    Returns
+    -------
+    CentreLine
+    """
     inner = inner_rows(contour.grid)
     s = contour.grid.chainages[inner]
     offset = contour.terms[inner, 1:3]

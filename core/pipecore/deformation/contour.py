@@ -127,18 +127,50 @@ class Contour:
 
 
 def harmonics(clock: Array, n_terms: int) -> Array:
-    """Values of the terms at clock angles (n,), shape (n, n_terms)."""
+    """Return 1, cos θ, sin θ, cos 2θ, sin 2θ at clock angles.
+
+    Parameters
+    ----------
+    clock : ndarray, shape (n,)
+        Radians.
+    n_terms : int
+        How many of them, up to five.
+
+    Returns
+    -------
+    ndarray, shape (n, n_terms)
+    """
     columns = [np.ones_like(clock), np.cos(clock), np.sin(clock), np.cos(2 * clock)]
     return np.stack([*columns, np.sin(2 * clock)][:n_terms], axis=1)
 
 
 def oval_knot_diameters(grid: Grid) -> float:
-    """Distance between knots for an oval element, in diameters."""
+    """Return the distance between knots for an oval element, in diameters.
+
+    Parameters
+    ----------
+    grid : Grid
+
+    Returns
+    -------
+    float
+    """
     return float(np.clip(OVAL_KNOTS / (2 * grid.radius), *OVAL_KNOT_DIAMETERS))
 
 
 def spline_basis(grid: Grid, knot_diameters: float) -> Basis:
-    """Cubic splines with equal knots at the rows of a grid."""
+    """Return cubic splines with equally spaced knots at the rows of a grid.
+
+    Parameters
+    ----------
+    grid : Grid
+    knot_diameters : float
+        Largest distance between knots, in diameters.
+
+    Returns
+    -------
+    Basis
+    """
     wanted = grid.length / (2 * grid.radius * knot_diameters)
     intervals = int(np.clip(np.ceil(wanted), 1, MAX_INTERVALS))
     step = grid.length / intervals
@@ -203,13 +235,34 @@ def _prior_band(
 
 
 def inner_rows(grid: Grid) -> Flags:
-    """Rows away from the ends, or all of a short element."""
+    """Return which rows lie away from the ends, or all of a short element.
+
+    Parameters
+    ----------
+    grid : Grid
+
+    Returns
+    -------
+    ndarray of bool, shape (rows,)
+    """
     margin = END_MARGIN * grid.radius if grid.length > 2 * grid.radius else 0.0
     return (grid.chainages >= margin) & (grid.chainages <= grid.length - margin)
 
 
 def usable_arc(grid: Grid, covered: Flags) -> float:
-    """Arc that the surface is seen over, radians: the median over rows that are seen."""
+    """Return the arc that a surface is seen over: the median over rows that are seen.
+
+    Parameters
+    ----------
+    grid : Grid
+    covered : ndarray of bool, shape (rows, columns)
+        Cells with points.
+
+    Returns
+    -------
+    float
+        Radians.
+    """
     seen = np.count_nonzero(covered, axis=1) * grid.column_angle
     seen = seen[seen > 0]
     return float(np.median(seen)) if len(seen) else 0.0

@@ -37,7 +37,18 @@ class Grid:
 
     @classmethod
     def for_element(cls, element: Element, spacing: float) -> "Grid":
-        """Return a grid of cells of 0.1 r, larger where points are `spacing` metres apart."""
+        """Return a grid of cells of 0.1 radii, larger where points are sparse.
+
+        Parameters
+        ----------
+        element : Element
+        spacing : float
+            Distance between points, metres.
+
+        Returns
+        -------
+        Grid
+        """
         radius = (element.radius + element.radius_end) / 2
         cell = max(CELL_PER_RADIUS * radius, 0.7 * spacing)
         length = element.axis.length
@@ -75,34 +86,98 @@ class Grid:
         return np.asarray((np.arange(self.n_columns) + 0.5) * self.column_angle)
 
     def rows_near(self, chainage: float, reach: float) -> slice:
-        """Rows whose middles may lie within reach of a chainage, metres."""
+        """Return the rows whose middles may lie within reach of a chainage.
+
+        Parameters
+        ----------
+        chainage, reach : float
+            Metres.
+
+        Returns
+        -------
+        slice
+        """
         first = math.floor((chainage - reach) / self.row_size - 0.5)
         last = math.ceil((chainage + reach) / self.row_size - 0.5)
         return slice(min(max(first, 0), self.n_rows), min(max(last + 1, 0), self.n_rows))
 
     def cell_of(self, chainage: Array, clock: Array) -> Cells:
-        """Flat index of the cell of each point; those beyond the ends fall into end cells."""
+        """Return the flat index of the cell of each point.
+
+        Parameters
+        ----------
+        chainage, clock : ndarray, shape (n,)
+            Metres and radians; points beyond the ends fall into the end cells.
+
+        Returns
+        -------
+        ndarray of int, shape (n,)
+        """
         row = np.clip(np.floor(chainage / self.row_size), 0, self.n_rows - 1)
         column = np.mod(np.floor(clock / self.column_angle), self.n_columns)
         return (row * self.n_columns + column).astype(np.intp)
 
     def count(self, cell: Cells) -> Array:
-        """Points per cell."""
+        """Return the number of points per cell.
+
+        Parameters
+        ----------
+        cell : ndarray of int, shape (n,)
+            Flat index of each point's cell.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+        """
         counts = np.bincount(cell, minlength=self.n_rows * self.n_columns)
         return counts.reshape(self.shape).astype(np.float64)
 
     def total(self, cell: Cells, values: Array) -> Array:
-        """Sum of `values` per cell."""
+        """Return the sum of values per cell.
+
+        Parameters
+        ----------
+        cell : ndarray of int, shape (n,)
+            Flat index of each point's cell.
+        values : ndarray, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+        """
         size = self.n_rows * self.n_columns
         return np.bincount(cell, values, minlength=size).reshape(self.shape).astype(np.float64)
 
     def mean(self, cell: Cells, values: Array) -> Array:
-        """Mean of `values` per cell, nan where there is none."""
+        """Return the mean of values per cell.
+
+        Parameters
+        ----------
+        cell : ndarray of int, shape (n,)
+            Flat index of each point's cell.
+        values : ndarray, shape (n,)
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            nan where a cell is empty.
+        """
         n = self.count(cell)
         return np.where(n > 0, self.total(cell, values) / np.maximum(n, 1), np.nan)
 
     def interpolate(self, table: Array, chainage: Array, clock: Array) -> Array:
-        """Values of a cell table at points, bilinear, round the clock."""
+        """Return the values of a table at points, bilinear between cells' middles, round the clock.
+
+        Parameters
+        ----------
+        table : ndarray, shape (rows, columns)
+        chainage, clock : ndarray, shape (n,)
+            Metres and radians.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
         values = np.empty(len(chainage))
         kernels.interpolate(table, self.row_size, self.column_angle, chainage, clock, values)
         return values
@@ -143,27 +218,70 @@ class DeviationMap:
 
 
 def close_holes(cells: Flags) -> Flags:
-    """Close holes of one or two cells, round the clock."""
+    """Close holes of one or two cells, round the clock.
+
+    Parameters
+    ----------
+    cells : ndarray of bool, shape (rows, columns)
+
+    Returns
+    -------
+    ndarray of bool, shape (rows, columns)
+    """
     wide = np.pad(np.pad(cells, ((0, 0), (3, 3)), mode="wrap"), ((3, 3), (0, 0)))
     return np.asarray(ndimage.binary_closing(wide, np.ones((3, 3)))[3:-3, 3:-3])
 
 
 def dilate(cells: Flags, times: int = 1) -> Flags:
-    """Grow flagged cells by `times` cells, round the clock."""
+    """Grow flagged cells to their neighbours, round the clock.
+
+    Parameters
+    ----------
+    cells : ndarray of bool, shape (rows, columns)
+    times : int
+        By how many cells.
+
+    Returns
+    -------
+    ndarray of bool, shape (rows, columns)
+    """
     wide = np.pad(cells, ((0, 0), (times, times)), mode="wrap")
     wide = ndimage.binary_dilation(wide, np.ones((3, 3)), iterations=times)
     return np.asarray(wide[:, times:-times])
 
 
 def box_sum(table: Array, reach: int = 1) -> Array:
-    """Sum over (2·reach + 1)² cells, round the clock, nothing beyond the ends."""
+    """Return sums over (2·reach + 1)² cells, round the clock, nothing beyond the ends.
+
+    Parameters
+    ----------
+    table : ndarray, shape (rows, columns)
+    reach : int
+        Cells to either side.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
+    """
     size = 2 * reach + 1
     along = ndimage.uniform_filter1d(table, size, axis=0, mode="constant") * size
     return np.asarray(ndimage.uniform_filter1d(along, size, axis=1, mode="wrap") * size)
 
 
 def point_spacing(element: Element, chainage: Array, clock: Array) -> float:
-    """Typical distance between points on an element, metres, from how many share a cell."""
+    """Return the typical distance between points on an element, from how many share a cell.
+
+    Parameters
+    ----------
+    element : Element
+    chainage, clock : ndarray, shape (n,)
+        Of its points, metres and radians.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
     radius = (element.radius + element.radius_end) / 2
     size = 0.25 * radius
     rows = max(1, round(element.axis.length / size))
@@ -176,10 +294,23 @@ def point_spacing(element: Element, chainage: Array, clock: Array) -> float:
 
 
 def local_noise(grid: Grid, cell: Cells, height: Array) -> Array:
-    """Standard deviation of one point around its neighbourhood's mean, per cell.
+    """Return the standard deviation of one point about its neighbourhood's mean, per cell.
 
     Robust (from the median of absolute residuals) over blocks of about 30° by 1 m, as
     noise follows range and incidence; the whole element's where a block has few points.
+
+    Parameters
+    ----------
+    grid : Grid
+    cell : ndarray of int, shape (n,)
+        Flat index of each point's cell.
+    height : ndarray, shape (n,)
+        Metres.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
+        Metres.
     """
     n, total = grid.count(cell), grid.total(cell, height)
     around, mean = box_sum(n), box_sum(total)
@@ -206,7 +337,19 @@ def local_noise(grid: Grid, cell: Cells, height: Array) -> Array:
 
 
 def group_median(group: Cells, values: Array, n_groups: int) -> tuple[Array, Array]:
-    """Median and count of `values` per group, shapes (n_groups,); nan where empty."""
+    """Return the median and the count of the values of each group.
+
+    Parameters
+    ----------
+    group : ndarray of int, shape (n,)
+    values : ndarray, shape (n,)
+    n_groups : int
+
+    Returns
+    -------
+    medians, counts : ndarray, shape (n_groups,)
+        Medians are nan where a group is empty.
+    """
     medians, counts = np.empty(n_groups), np.empty(n_groups)
     kernels.group_medians(group, values, medians, counts)
     return medians, counts

@@ -107,7 +107,20 @@ def mesh_surface(
 def mesh_elements(
     cloud: PointCloud, result: Result, element_ids: Sequence[int], exaggeration: float = 1.0
 ) -> list[SurfaceMesh]:
-    """Return the meshes of whole elements."""
+    """Return the meshes of whole elements.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    result : Result
+    element_ids : sequence of int
+    exaggeration : float
+        Factor on deviations as drawn.
+
+    Returns
+    -------
+    list of SurfaceMesh
+    """
     meshes = []
     for element_id in element_ids:
         element = result.element(element_id)

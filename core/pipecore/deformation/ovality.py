@@ -56,7 +56,18 @@ def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
 
 
 def mean_ovality(contour: Contour) -> tuple[float, float]:
-    """Return the ovality of an element's mean section and its standard deviation, ratios."""
+    """Return the ovality of an element's mean section.
+
+    Parameters
+    ----------
+    contour : Contour
+        Fitted with five terms.
+
+    Returns
+    -------
+    ovality, ovality_sd : float
+        Ratio (Dmax - Dmin) / Dnom and its standard deviation.
+    """
     weights = contour.basis.mean
     mean = (weights @ contour.coefficients)[3:5]
     covariance = np.einsum("a,akbl,b->kl", weights, contour.covariance, weights)[3:5, 3:5]
@@ -67,9 +78,21 @@ def mean_ovality(contour: Contour) -> tuple[float, float]:
 
 
 def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
-    """Return stretches at least one diameter long whose ovality reaches `min_ovality`.
+    """Find the stretches at least one diameter long that are oval.
 
-    A stretch goes on where the ovality stays above half of `min_ovality`.
+    A stretch continues where the ovality stays above half of `min_ovality`.
+
+    Parameters
+    ----------
+    contour : Contour
+        Fitted with five terms.
+    min_ovality : float
+        Ratio (Dmax - Dmin) / Dnom that its peak has to reach.
+
+    Returns
+    -------
+    list of OvalStretch
+        In order of chainage.
     """
     ovality, sd, clock = ovality_along(contour)
     found = []
@@ -98,7 +121,16 @@ def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
 
 
 def true_ranges(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Return the first and last index of each unbroken sequence of true values."""
+    """Return the first and last index of each unbroken sequence of true values.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (n,)
+
+    Returns
+    -------
+    list of (int, int)
+    """
     edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
     return list(
         zip(

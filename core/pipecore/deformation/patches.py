@@ -79,10 +79,29 @@ def find_patches(
     n_terms: int,
     knot_diameters: float,
 ) -> tuple[list[Patch], Contour]:
-    """Return the bumps above `significance`, and the contour that they were measured against.
+    """Find the dents and bulges of an element, and the contour they were measured against.
 
-    Looking for bumps and fitting the contour take turns: the contour is fitted without
-    the places that stand out so far, and more stands out over the better contour.
+    The search for bumps and the fit of the contour alternate: the contour is fitted with the
+    bumps found so far masked, and more is found against the better contour.
+
+    Parameters
+    ----------
+    element : Element
+    surface : ElementSurface
+    cells : DeviationMap
+        Its heights above the element's fitted surface.
+    significance : float
+        Least height over its noise.
+    n_terms : int
+        Terms of the contour: 3, or 5 with ovality.
+    knot_diameters : float
+        Distance between its knots, in diameters.
+
+    Returns
+    -------
+    patches : list of Patch
+        The most significant first.
+    contour : Contour
     """
     grid = cells.grid
     some = cells.count > 0

@@ -58,7 +58,17 @@ class RunLinks:
 
 
 def link_run(elements: Sequence[Element]) -> RunLinks:
-    """Link the elements of one run where they come nearest."""
+    """Link the elements of one run where they come nearest.
+
+    Parameters
+    ----------
+    elements : sequence of Element
+        All of one run.
+
+    Returns
+    -------
+    RunLinks
+    """
     n = len(elements)
     ends = np.array([p for e in elements for p in (e.axis.start, e.axis.end)])
     length = np.array([e.axis.length for e in elements])

@@ -86,7 +86,17 @@ class SectionCurve:
         return float(sum(end - start for start, end in self.spans))
 
     def is_seen(self, clock: ArrayLike) -> np.ndarray:
-        """Whether the curve stands for points at clock angles of any shape."""
+        """Return whether the curve is defined at clock angles.
+
+        Parameters
+        ----------
+        clock : array_like
+            Radians, any shape.
+
+        Returns
+        -------
+        ndarray of bool, shape of clock
+        """
         theta = np.asarray(clock, dtype=np.float64)
         seen = np.zeros(theta.shape, dtype=bool)
         for start, end in self.spans:
@@ -94,22 +104,53 @@ class SectionCurve:
         return seen
 
     def radius_at(self, clock: ArrayLike) -> Array:
-        """Distance from the axis at clock angles of any shape, metres; nan where not seen."""
+        """Return the distance from the axis at clock angles.
+
+        Parameters
+        ----------
+        clock : array_like
+            Radians, any shape.
+
+        Returns
+        -------
+        ndarray, shape of clock
+            Metres; nan where not seen.
+        """
         theta = np.asarray(clock, dtype=np.float64)
         r = _basis(theta, self.order) @ self.coefficients
         return np.asarray(np.where(self.is_seen(theta), r, np.nan))
 
     def radius_sd_at(self, clock: ArrayLike) -> Array:
-        """Standard deviation of `radius_at`, metres."""
+        """Return the standard deviation of `radius_at`.
+
+        Parameters
+        ----------
+        clock : array_like
+            Radians, any shape.
+
+        Returns
+        -------
+        ndarray, shape of clock
+            Metres; nan where not seen.
+        """
         theta = np.asarray(clock, dtype=np.float64)
         sd = np.linalg.norm(_basis(theta, self.order) @ self.root, axis=-1)
         return np.asarray(np.where(self.is_seen(theta), sd, np.nan))
 
     def curvature_at(self, clock: ArrayLike) -> Array:
-        """Signed curvature at clock angles of any shape, 1/metres; nan where not seen.
+        """Return the signed curvature at clock angles, (r² + 2r′² − r r″) / (r² + r′²)^{3/2}.
 
-        Positive where the section bulges outward, as a circle does everywhere:
-        (r² + 2r′² − r r″) / (r² + r′²)^{3/2}.
+        Positive where the section bulges outward, as a circle does everywhere.
+
+        Parameters
+        ----------
+        clock : array_like
+            Radians, any shape.
+
+        Returns
+        -------
+        ndarray, shape of clock
+            1/metres; nan where not seen.
         """
         theta = np.asarray(clock, dtype=np.float64)
         r, slope, bend = (_basis(theta, self.order, k) @ self.coefficients for k in range(3))
@@ -117,9 +158,19 @@ class SectionCurve:
         return np.asarray(np.where(self.is_seen(theta), curvature, np.nan))
 
     def curvature_sd_at(self, clock: ArrayLike) -> Array:
-        """Standard deviation of `curvature_at`, 1/metres.
+        """Return the standard deviation of `curvature_at`.
 
-        By far the most of it is that of r″, which alone is taken along: sd(r″) / r².
+        Of r″ only, sd(r″) / r², which is by far the largest part.
+
+        Parameters
+        ----------
+        clock : array_like
+            Radians, any shape.
+
+        Returns
+        -------
+        ndarray, shape of clock
+            1/metres; nan where not seen.
         """
         theta = np.asarray(clock, dtype=np.float64)
         r = _basis(theta, self.order) @ self.coefficients
@@ -127,7 +178,18 @@ class SectionCurve:
         return np.asarray(np.where(self.is_seen(theta), sd, np.nan))
 
     def clocks(self, step: float = STEP) -> list[Array]:
-        """Clock angles from end to end of every span, to draw the curve by."""
+        """Return clock angles from end to end of every span, to draw the curve by.
+
+        Parameters
+        ----------
+        step : float
+            Largest distance between them, radians.
+
+        Returns
+        -------
+        list of ndarray
+            Radians, one array for each span.
+        """
         return [
             np.linspace(start, end, max(2, int(np.ceil((end - start) / step)) + 1))
             for start, end in self.spans

@@ -45,7 +45,20 @@ class UnrolledPoints:
 
 
 def unroll(element: Element, xyz: Array, normals: Array) -> UnrolledPoints:
-    """Return points (n, 3) with their normals in the coordinates of an element."""
+    """Return points in the coordinates of an element.
+
+    Parameters
+    ----------
+    element : Element
+    xyz : ndarray, shape (n, 3)
+        Local coordinates, metres.
+    normals : ndarray, shape (n, 3)
+        Unit normals of either sign, nan where not known.
+
+    Returns
+    -------
+    UnrolledPoints
+    """
     chainage, distance, clock, height, alignment = np.empty((5, len(xyz)))
     slope = (element.radius_end - element.radius) / element.axis.length
     kernels.unroll(
@@ -62,7 +75,19 @@ def unroll(element: Element, xyz: Array, normals: Array) -> UnrolledPoints:
 
 
 def surface_distance(element: Element, xyz: Array) -> Array:
-    """Unsigned distance of points (n, 3) from an element's surface between its ends."""
+    """Return the distance of points from an element's surface between its ends.
+
+    Parameters
+    ----------
+    element : Element
+    xyz : ndarray, shape (n, 3)
+        Local coordinates, metres.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Metres, not negative.
+    """
     if element.kind is ElementKind.SPHERE:
         return np.asarray(np.abs(np.linalg.norm(xyz - element.centre, axis=1) - element.radius))
     chainage, distance, clock = np.empty((3, len(xyz)))
@@ -72,7 +97,18 @@ def surface_distance(element: Element, xyz: Array) -> Array:
 
 
 def stretch(element: Element, clock: Array | float) -> Array:
-    """Length on the surface per chainage: 1, but more outside and less inside of a bend."""
+    """Return the length on the surface per chainage: 1, but more outside and less inside a bend.
+
+    Parameters
+    ----------
+    element : Element
+    clock : ndarray or float
+        Radians.
+
+    Returns
+    -------
+    ndarray, shape of clock
+    """
     axis, theta = element.axis, np.asarray(clock, dtype=np.float64)
     if not isinstance(axis, ArcAxis):
         return np.ones_like(theta)
@@ -83,7 +119,16 @@ def stretch(element: Element, clock: Array | float) -> Array:
 
 
 def min_stretch(element: Element) -> float:
-    """Least value of `stretch` all round; not quite zero in the tightest bend."""
+    """Return the least value of `stretch` all round, at least 0.05.
+
+    Parameters
+    ----------
+    element : Element
+
+    Returns
+    -------
+    float
+    """
     if not isinstance(element.axis, ArcAxis):
         return 1.0
     return float(max(1.0 - element.radius / element.axis.bend_radius, 0.05))

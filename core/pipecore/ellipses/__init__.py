@@ -98,7 +98,21 @@ class Ellipses:
 
 
 def akaike(n_parameters: int, n_points: NDArray[np.integer], rss: Array) -> Array:
-    """Akaike's information criterion, equation 4 of the paper: 2k + n ln(2π·RSS/n)."""
+    """Return Akaike's information criterion, 2k + n ln(2π·RSS/n): equation 4 of the paper.
+
+    Parameters
+    ----------
+    n_parameters : int
+        k.
+    n_points : ndarray of int, shape (m,)
+        n of each group.
+    rss : ndarray, shape (m,)
+        Residual sum of squares of each group, metres².
+
+    Returns
+    -------
+    ndarray, shape (m,)
+    """
     result = 2 * n_parameters + n_points * np.log(2 * np.pi * np.maximum(rss, 1e-18) / n_points)
     return np.asarray(result, np.float64)
 
@@ -110,12 +124,27 @@ def fit_ellipses(
     sizes: ElementSettings,
     check: Callable[[], None] = lambda: None,
 ) -> Ellipses:
-    """Fit an ellipse to every curve of a stack and keep those that are one.
+    """Fit an ellipse to every curve of a stack and return those that are accepted.
 
     The ellipse is constrained: an oblique cut through a cylinder whose direction comes
-    from the points' normals. It is kept if its flattening, arc, residual and radius are
+    from the points' normals. It is accepted if its flattening, arc, residual and radius are
     within bounds, its normals point to its centre, and Akaike's criterion prefers it to
-    a line. `check` is called now and then; it may raise to cancel.
+    a line.
+
+    Parameters
+    ----------
+    curves : Curves
+    surface : Surface
+        The surface that they were cut out of.
+    settings : EllipseSettings
+    sizes : ElementSettings
+        Their bounds on the radius.
+    check : callable
+        Called now and then; may raise to cancel.
+
+    Returns
+    -------
+    Ellipses
     """
     fits = CurveFits.empty(len(curves))
     tolerance = surface.tolerance
@@ -180,7 +209,20 @@ def _competing_fits(
 
 
 def line_rss(points: Array, starts: NDArray[np.int64]) -> Array:
-    """Residual sum of squares of the best line through each group of points (n, 2)."""
+    """Return the residual sum of squares of the best line through each group of points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        Grouped.
+    starts : ndarray of int, shape (m + 1,)
+        Where each group starts; the last entry is n.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        In the square of the points' unit.
+    """
     counts = np.diff(starts)
     mean = np.add.reduceat(points, starts[:-1]) / counts[:, None]
     x, y = (points - np.repeat(mean, counts, axis=0)).T

@@ -15,14 +15,36 @@ N_PARAMETERS = 5
 
 
 def to_parameters(centre: Array, semi_major: float, semi_minor: float, angle: float) -> Array:
-    """The five parameters of an ellipse given by its semi-axes and angle, shape (5,)."""
+    """Return the five parameters of an ellipse.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (2,)
+    semi_major, semi_minor : float
+    angle : float
+        Of the major axis from the first coordinate, radians.
+
+    Returns
+    -------
+    ndarray, shape (5,)
+        Centre x and y, m, h·cos 2θ and h·sin 2θ.
+    """
     mean, half_difference = 0.5 * (semi_major + semi_minor), 0.5 * (semi_major - semi_minor)
     cos_part, sin_part = half_difference * np.cos(2 * angle), half_difference * np.sin(2 * angle)
     return np.array([*centre, mean, cos_part, sin_part])
 
 
 def canonical(parameters: Array) -> Array:
-    """The same ellipse with both semi-axes positive."""
+    """Return the parameters of the same ellipse with both semi-axes positive.
+
+    Parameters
+    ----------
+    parameters : ndarray, shape (5,)
+
+    Returns
+    -------
+    ndarray, shape (5,)
+    """
     x, y, mean, cos_part, sin_part = parameters
     half_difference = np.hypot(cos_part, sin_part)
     angle = 0.5 * np.arctan2(sin_part, cos_part)
@@ -33,10 +55,21 @@ def canonical(parameters: Array) -> Array:
 
 
 def orthogonal_distances(points: Array, parameters: Array) -> tuple[Array, Array]:
-    """Signed orthogonal distances (n,), outside positive, and their derivatives (n, 5).
+    """Return orthogonal distances from an ellipse, and their derivatives by its parameters.
 
     The foot of a point slides along the ellipse, across the normal n, so the distance
     changes only with the ellipse's own motion at the foot: -n·∂(c + S·u).
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+    parameters : ndarray, shape (5,)
+
+    Returns
+    -------
+    distance : ndarray, shape (n,)
+        Outside positive.
+    jacobian : ndarray, shape (n, 5)
     """
     mean, cos_part, sin_part = parameters[2:]
     half_difference = np.hypot(cos_part, sin_part)
@@ -75,10 +108,21 @@ def _foot_on_circle(points: Array, axes: Array) -> Array:
 
 
 def radial_distances(points: Array, parameters: Array) -> tuple[Array, Array]:
-    """Distances along the rays from the centre (n,), and their derivatives (n, 5).
+    """Return distances along the rays from the centre, and their derivatives by the parameters.
 
     v = d - r, equations 2 and 3 of the paper: with y = S⁻¹(x - c) the ray meets the
     ellipse at r = d / |y|.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+    parameters : ndarray, shape (5,)
+
+    Returns
+    -------
+    distance : ndarray, shape (n,)
+        Outside positive.
+    jacobian : ndarray, shape (n, 5)
     """
     x, y, mean, cos_part, sin_part = parameters
     inverse = np.linalg.inv(np.array([[mean + cos_part, sin_part], [sin_part, mean - cos_part]]))

@@ -86,13 +86,35 @@ class Curves:
 
 
 def stack_frame(direction: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rows e1, e2, d: a right-handed frame with d along `direction`."""
+    """Return a right-handed frame with its last vector along a stack.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (3,)
+        Unit vector.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rows e1, e2 (in the profiles' planes) and d.
+    """
     e1 = unit(np.cross(np.eye(3)[np.argmin(np.abs(direction))], direction))
     return np.stack([e1, np.cross(direction, e1), direction])
 
 
 def stack_cut(stack: Stack, frame: NDArray[np.float64]) -> kernels.StackCut:
-    """Return how a stack cuts, as the kernels take it; `frame` is its `stack_frame`."""
+    """Return how a stack cuts, as the kernels take it.
+
+    Parameters
+    ----------
+    stack : Stack
+    frame : ndarray, shape (3, 3)
+        Its `stack_frame`.
+
+    Returns
+    -------
+    StackCut
+    """
     return kernels.StackCut(frame[2], frame[0], frame[1], stack.width, stack.offset)
 
 

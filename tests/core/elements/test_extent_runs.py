@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore._kernels.extent import turn_of_normals
+from pipecore._kernels.axis_rows import normal_turning
 from pipecore.elements.refinement.extent import find_extent, section_misfit
 from pipecore.elements.runs.ends import AxisSpan, LineIndex, meeting_ends
 from pipecore.elements.runs.numbering import number_runs
@@ -126,7 +126,7 @@ def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
         _, clock, _, lean = points
         row = rng.integers(0, 2, len(clock))
         found = np.empty(3)
-        turn_of_normals(clock, lean, row, found)
+        normal_turning(clock, lean, row, found)
         assert_allclose(found, [turning, turning, 0.0], atol=0.1)
 
 
