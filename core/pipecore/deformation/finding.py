@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.deformation.bump import Bump
 from pipecore.deformation.centre_line import CENTRE_KNOTS, MIN_BOW_RATIO, measure_centre_line
 from pipecore.deformation.contour import (
     KNOT_DIAMETERS,
@@ -19,19 +18,17 @@ from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.element_surface import ElementSurface, find_element_surface
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
 from pipecore.deformation.patches import Patch, find_patches
-from pipecore.deformation.strain import dent_strain
+from pipecore.deformation.records import describe_bow, describe_oval, describe_patch
 from pipecore.deformation.unrolled_points import UnrolledPoints, surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.reasons import Reason
 from pipecore.settings import DeformationSettings
-from pipecore.types import NO_ID, Deformation, DeformationKind, Element, ElementKind
+from pipecore.types import Deformation, DeformationKind, Element, ElementKind
 
 SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS, ElementKind.TEE)
 """Kinds whose contour is known well enough to look for deformations."""
 
 NO_REASON = Reason()
-
-STRAIN_SIGNIFICANCE = 5.0
 
 MIN_DEPTH_SD = 3.0
 """A depth has to be this many times its standard deviation."""
@@ -139,13 +136,13 @@ def find_deformations(
 
     least = settings.min_depth_mm / 1000
     deformations = [
-        _as_deformation(element, surface, contour, p, settings)
+        describe_patch(element, surface, contour, p, settings.wall_thickness_mm / 1000)
         for p in patches
         if abs(p.bump.height) >= max(least, MIN_DEPTH_SD * p.bump.height_sd)
         and _arc_at(heights, p) >= MIN_DENT_ARC
     ]
     ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
-    deformations += [_oval_deformation(element, surface, contour, o) for o in stretches]
+    deformations += [describe_oval(element, surface, contour, o) for o in stretches]
     straightness, why_not_straight = np.nan, NO_REASON
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
         straightness, why_not_straight, bow = _measure_bow(
@@ -252,64 +249,6 @@ def _height_map(
     )
 
 
-def _as_deformation(
-    element: Element,
-    surface: ElementSurface,
-    contour: Contour,
-    patch: Patch,
-    settings: DeformationSettings,
-) -> Deformation:
-    grid, bump = surface.grid, patch.bump
-    depth = abs(bump.height)
-    radius = float(element.radius_at(patch.chainage))
-    inside = patch.cells(grid).ravel()[surface.cell] & surface.belongs
-    strain, why = _strain(bump, radius, settings.wall_thickness_mm / 1000)
-    if not bump.is_peak_seen:
-        why = dict.fromkeys(("depth", "volume", *why), Reason("too few points at its peak"))
-    return Deformation(
-        deformation_id=NO_ID,
-        element_id=element.element_id,
-        kind=DeformationKind.DENT if bump.height < 0 else DeformationKind.BULGE,
-        chainage=patch.chainage,
-        chainage_start=max(patch.chainage - patch.span / 2, 0.0),
-        chainage_end=min(patch.chainage + patch.span / 2, element.axis.length),
-        clock=patch.clock,
-        peak=_peak(element, contour, patch.chainage, patch.clock, bump.height),
-        depth=depth if bump.is_peak_seen else np.nan,
-        depth_sd=bump.height_sd if bump.is_peak_seen else np.nan,
-        length=bump.length,
-        width=bump.width,
-        strain=strain if bump.is_peak_seen else np.nan,
-        n_points=int(np.count_nonzero(inside)),
-        significance=abs(patch.z),
-        area=bump.area,
-        volume=bump.volume if bump.is_peak_seen else np.nan,
-        not_measurable=why,
-    )
-
-
-def _strain(bump: Bump, radius: float, wall: float) -> tuple[float, dict[str, Reason]]:
-    """Strain of a dent, or why it is not measurable; neither for a bulge."""
-    if bump.height > 0:
-        return np.nan, {}
-    if wall == 0:
-        return np.nan, {"strain": Reason("the wall thickness is not set")}
-    if abs(bump.height) < STRAIN_SIGNIFICANCE * bump.height_sd:
-        why = Reason(
-            "the depth is less than {least} standard deviations", least=f"{STRAIN_SIGNIFICANCE:g}"
-        )
-        return np.nan, {"strain": why}
-    strain = dent_strain(
-        depth=abs(bump.height),
-        length=bump.length,
-        curvature_along=bump.curvature_along,
-        curvature_around=bump.curvature_around,
-        radius=radius,
-        wall=wall,
-    )
-    return strain, {}
-
-
 def _is_of_ovality(patch: Patch, stretches: list[OvalStretch], grid: Grid) -> bool:
     """Whether a bump is what a contour could not follow at the ends of an oval stretch."""
     diameter = 2 * grid.radius
@@ -328,32 +267,6 @@ def _is_of_kink(found: Deformation, bow: list[Deformation], grid: Grid) -> bool:
         and abs(found.chainage - line.chainage) < 2 * grid.radius
         and not found.depth >= 0.5 * line.depth
         for line in bow
-    )
-
-
-def _oval_deformation(
-    element: Element, surface: ElementSurface, contour: Contour, oval: OvalStretch
-) -> Deformation:
-    """An oval stretch; its depth is how far the section leaves the circle."""
-    grid = surface.grid
-    row = surface.cell[surface.belongs] // grid.n_columns
-    chainage = float(grid.chainages[oval.peak])
-    return Deformation(
-        deformation_id=NO_ID,
-        element_id=element.element_id,
-        kind=DeformationKind.OVALITY,
-        chainage=chainage,
-        chainage_start=oval.first * grid.row_size,
-        chainage_end=(oval.last + 1) * grid.row_size,
-        clock=oval.clock,
-        peak=_peak(element, contour, chainage, oval.clock, 0.0),
-        depth=oval.ovality * grid.radius / 2,
-        depth_sd=oval.ovality_sd * grid.radius / 2,
-        length=(oval.last + 1 - oval.first) * grid.row_size,
-        width=2 * np.pi * grid.radius,
-        ovality=oval.ovality,
-        n_points=int(np.count_nonzero((row >= oval.first) & (row <= oval.last))),
-        significance=oval.z,
     )
 
 
@@ -392,30 +305,4 @@ def _measure_bow(
     is_short = grid.length < MIN_BOW_LENGTH * 2 * grid.radius
     if is_short or line.explained < MIN_EXPLAINED:
         return line.straightness, NO_REASON, []
-    deformation = Deformation(
-        deformation_id=NO_ID,
-        element_id=element.element_id,
-        kind=DeformationKind.KINK if line.is_kink else DeformationKind.BOW,
-        chainage=line.chainage,
-        chainage_start=0.0,
-        chainage_end=grid.length,
-        clock=line.clock,
-        peak=_peak(element, contour, line.chainage, line.clock, 0.0),
-        depth=line.straightness,
-        depth_sd=line.straightness_sd,
-        length=grid.length,
-        width=2 * grid.radius,
-        n_points=int(np.count_nonzero(surface.belongs)),
-        significance=line.straightness / line.straightness_sd,
-    )
-    return line.straightness, NO_REASON, [deformation]
-
-
-def _peak(
-    element: Element, contour: Contour, chainage: float, clock: float, height: float
-) -> Array:
-    """The point on the deformed surface at a place, shape (3,)."""
-    grid: Grid = contour.grid
-    undeformed = grid.interpolate(contour.height, np.array([chainage]), np.array([clock]))
-    radius = float(element.radius_at(chainage)) + float(undeformed[0]) + height
-    return surface_points(element.axis, chainage, radius, clock)
+    return line.straightness, NO_REASON, [describe_bow(element, surface, contour, line)]
