@@ -64,3 +64,48 @@ def pipe_coordinates(axis, xyz, chainage, rho, clock):
     for i in range(xyz.shape[0]):
         chainage[i], up, right = across_axis(axis, xyz[i, 0], xyz[i, 1], xyz[i, 2])
         rho[i], clock[i] = polar(up, right)
+
+
+@njit(cache=True, nogil=True)
+def place_on_axis(axis, chainage):
+    """Return the point of an axis at a chainage, metres.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    chainage : metres
+    """
+    bend = axis[12]
+    if bend == 0.0:
+        return (
+            axis[0] + chainage * axis[3],
+            axis[1] + chainage * axis[4],
+            axis[2] + chainage * axis[5],
+        )
+    cos, sin = bend * math.cos(chainage / bend), bend * math.sin(chainage / bend)
+    return (
+        axis[0] + cos * axis[6] + sin * axis[9],
+        axis[1] + cos * axis[7] + sin * axis[10],
+        axis[2] + cos * axis[8] + sin * axis[11],
+    )
+
+
+@njit(cache=True, nogil=True)
+def tangent(axis, chainage):
+    """Return the unit tangent of an axis towards increasing chainage.
+
+    Parameters
+    ----------
+    axis (17,) : see `pipe_coordinates`
+    chainage : metres
+    """
+    bend = axis[12]
+    if bend == 0.0:
+        return axis[3], axis[4], axis[5]
+    cos, sin = math.cos(chainage / bend), math.sin(chainage / bend)
+    # The normal of the arc times outward.
+    return (
+        cos * axis[9] - sin * axis[6],
+        cos * axis[10] - sin * axis[7],
+        cos * axis[11] - sin * axis[8],
+    )

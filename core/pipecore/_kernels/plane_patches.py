@@ -184,7 +184,7 @@ def mark_planes(means, is_flat, roots, max_ratio, is_plane):
     """Mark the cells of patches, flat cells of one root, that are plane.
 
     A patch is if its root mean square distance from its plane is small against the mean square
-    of its shorter extent, and it is not too small to tell.
+    of its shorter extent, and it has at least `MIN_CELLS` cells.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ LEAST_SCALE = 1e-5
 SETTLED = 0.02
 """A fit ends only when the scale changes by no more than this share."""
 FACING = 0.3
-"""Least cosine to the beam of points that tell the noise along it."""
+"""Least cosine to the beam of points whose scatter is taken as noise along it."""
 
 
 class BeamNoise(NamedTuple):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipecore._kernels import cell_search, pipe_coordinates, surface_fit, surface_models
+from pipecore._kernels import pipe_coordinates, surface_fit, surface_models
 from pipecore._kernels.grouping import group_by_label
 from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
@@ -151,8 +151,8 @@ def test_that_pipe_coordinates_are_those_of_the_axis(rng):
         pipe_coordinates.pipe_coordinates(axis.numbers, xyz, *found)
         assert_allclose(found, axis.pipe_coordinates(xyz), atol=1e-12)
         s = rng.uniform(-0.2, 1.0)
-        assert_allclose(cell_search.place_on_axis(axis.numbers, s), axis.at(s), atol=1e-12)
-        assert_allclose(cell_search.tangent(axis.numbers, s), axis.tangent(s), atol=1e-12)
+        assert_allclose(pipe_coordinates.place_on_axis(axis.numbers, s), axis.at(s), atol=1e-12)
+        assert_allclose(pipe_coordinates.tangent(axis.numbers, s), axis.tangent(s), atol=1e-12)
 
 
 def cloud_around(rng, axis, n=400):

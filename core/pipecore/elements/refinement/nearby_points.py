@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore._kernels import cell_search as kernels
+from pipecore._kernels import cell_search, point_search
 from pipecore._kernels.grouping import group_by_label, group_into
 from pipecore._kernels.voxel_hash import rename_voxels
 from pipecore.allocation import Allocate, in_memory
@@ -131,7 +131,7 @@ class NearbyPoints:
         rename_voxels(cell, 0, len(cell), rank)
         points = allocate("points_of_cells", (len(cell),), np.int32)
         starts = group_into(cell, len(order), points)
-        self._grid = kernels.PointCells(
+        self._grid = cell_search.PointCells(
             np.asarray(first * edge, np.float64), COARSE * edge, coarse_y, coarse_z, table,
             cell_starts, middles, 0.5 * np.sqrt(3.0) * edge + 1e-6, points, starts,
         )  # fmt: skip
@@ -139,9 +139,9 @@ class NearbyPoints:
     def around_axis(self, axis: Axis, radius: float, margin: float) -> Indices:
         """Downsampled points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
         inner, outer = INNER * radius, OUTER * radius
-        tube = kernels.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
-        cells = kernels.cells_around(self._grid, tube)
-        return np.asarray(kernels.points_around(self.surface.xyz, self._grid, cells, tube))
+        tube = cell_search.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
+        cells = cell_search.cells_around(self._grid, tube)
+        return np.asarray(point_search.points_around(self.surface.xyz, self._grid, cells, tube))
 
     def on_surface(
         self,
@@ -174,24 +174,24 @@ class NearbyPoints:
             Whether a sample of the points will do where there are many.
         """
         inner, outer = INNER * model.radius, OUTER * model.radius
-        points = kernels.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
-        target = kernels.Target(model.kind, model.numbers(), band, depth, min_cos)
-        tube = kernels.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
+        points = point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
+        target = point_search.Target(model.kind, model.numbers(), band, depth, min_cos)
+        tube = cell_search.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
         # Only in a shell about the surface, which for a cone is not about one distance.
         shell = tube
         if not model.is_conical:
             shell = tube._replace(
                 inner=max(inner, model.radius - band), outer=min(outer, model.radius + band)
             )
-        own, columns, spacing = kernels.points_on_surface(
+        own, columns, spacing = point_search.points_on_surface(
             points, self.surface.spacing, self.surface.voxel, self._grid, tube, shell, target,
             FEW if is_rough else 0,
         )  # fmt: skip
 
         def look_inside(begin: float, end: float) -> Array:
             part = tube._replace(begin=begin, end=end)
-            cells = kernels.cells_around(self._grid, part)
-            found: Array = kernels.points_inside(points, self._grid, cells, part, target)
+            cells = cell_search.cells_around(self._grid, part)
+            found: Array = point_search.points_inside(points, self._grid, cells, part, target)
             return found
 
         residual, chainage, clock, lean = columns
@@ -212,24 +212,26 @@ class NearbyPoints:
         """
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
         inner = model.radius - band
-        cells = kernels.cells_in_shell(self._grid, model.centre, inner, outer)
-        stride = kernels.stride_of(self._grid, cells, FEW if is_rough else 0)
+        cells = cell_search.cells_in_shell(self._grid, model.centre, inner, outer)
+        stride = point_search.stride_of(self._grid, cells, FEW if is_rough else 0)
         return np.asarray(
-            kernels.points_on_sphere(
-                kernels.OrientedPoints(self.surface.xyz, self.surface.normals, is_free),
+            point_search.points_on_sphere(
+                point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free),
                 self._grid, cells, model.centre, inner, outer, min_cos, stride,
             )
         )  # fmt: skip
 
     def usual_spacing(self, downsampled: Indices) -> float:
         """Distance between neighbours among some downsampled points, not below the thinning's."""
-        return float(kernels.usual_spacing(self.surface.spacing, downsampled, self.surface.voxel))
+        return float(
+            point_search.usual_spacing(self.surface.spacing, downsampled, self.surface.voxel)
+        )
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
         """Downsampled points within `radius` of a place, in order."""
-        cells = kernels.cells_in_shell(self._grid, centre, 0.0, radius)
+        cells = cell_search.cells_in_shell(self._grid, centre, 0.0, radius)
         return np.asarray(
-            kernels.points_in_ball(self.surface.xyz, self._grid, cells, centre, radius)
+            point_search.points_in_ball(self.surface.xyz, self._grid, cells, centre, radius)
         )
 
     def full_resolution(self, downsampled: Indices) -> tuple[Indices, Array]:
@@ -240,7 +242,7 @@ class NearbyPoints:
         """
         n = int(self._n_behind(downsampled).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
-        kernels.full_resolution_points(
+        point_search.full_resolution_points(
             self._members, self._starts, downsampled, self._cloud.xyz, index, xyz
         )
         return index, xyz
