@@ -1,6 +1,6 @@
 """Tables as plain columns: a dict of arrays of one length, with a way to pandas."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +37,11 @@ class Table(dict[str, NDArray[Any]]):
     def n_rows(self) -> int:
         """Number of rows."""
         return len(next(iter(self.values()), ()))
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield each row as a dict of its values, by column."""
+        for values in zip(*self.values(), strict=True):
+            yield dict(zip(self, values, strict=True))
 
     def to_pandas(self) -> "pd.DataFrame":
         """Return the table as a data frame.

@@ -209,6 +209,7 @@ def test_that_a_notebook_shows_tables_with_their_texts_escaped() -> None:
     assert "<td>84.15</td>" in page
     named = pipecore.Table([("name", np.array(["<b>A & B</b>"], object), None)])
     assert "&lt;b&gt;A &amp; B&lt;/b&gt;" in named._repr_html_()
+    assert list(named.rows()) == [{"name": "<b>A & B</b>"}]
     many = pipecore.Table([("n", np.arange(1000), None)])
     assert "10 of 1,000 rows" in many._repr_html_()
     assert many._repr_html_().count("<tr>") == 11
