@@ -167,7 +167,7 @@ def connect_panels(window: MainWindow, session: Session, controllers: Controller
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
     panels.settings.keys_reset.connect(lambda keys: do(commands.reset_keys, keys))
     panels.settings.presets.chosen.connect(lambda settings: do(commands.apply_preset, settings))
-    panels.settings.presets.failed.connect(lambda text: session.tell(text, "error"))
+    panels.settings.presets.failed.connect(lambda text: session.show_message(text, "error"))
     panels.settings.reset_requested.connect(lambda: do(commands.reset_settings))
     panels.stacks.preset_chosen.connect(lambda preset: do(commands.set_preset, preset))
     panels.stacks.added.connect(lambda stack: do(commands.add_stack, stack))
@@ -225,10 +225,10 @@ def connect_previews(window: MainWindow, previews: Previews) -> None:
     stacks, view = window.panels.stacks, window.views.preview
     previews.planned.connect(stacks.show_plan)
     previews.previewed.connect(view.apply)
-    stacks.seen.connect(previews.watch_list)
+    stacks.seen.connect(previews.set_list_visible)
     stacks.preview_wanted.connect(lambda _: window.panels.show_plot(view))
     stacks.preview_wanted.connect(previews.choose)
-    view.seen.connect(previews.watch_profile)
+    view.seen.connect(previews.set_profile_visible)
     view.chosen.connect(previews.choose)
     view.step_requested.connect(previews.step)
 
@@ -271,7 +271,7 @@ def connect_updates(
 
 def connect_jobs(window: MainWindow, session: Session, controllers: Controllers) -> None:
     """Connect the work in the background to status bar, message bar and document."""
-    jobs, status, tell = session.jobs, window.status, session.tell
+    jobs, status, show = session.jobs, window.status, session.show_message
     status.cancel_requested.connect(jobs.cancel)
     jobs.started.connect(status.start)
     jobs.progressed.connect(status.progress)
@@ -280,12 +280,12 @@ def connect_jobs(window: MainWindow, session: Session, controllers: Controllers)
     jobs.ended.connect(window.end_partial_cloud)
     jobs.ended.connect(status.end)
     jobs.parallel_changed.connect(status.show_beside)
-    jobs.cancelled.connect(lambda title: tell(tr("{title} was cancelled.").format(title=title)))
-    jobs.failed.connect(lambda message, details: tell(message, "error", details))
+    jobs.cancelled.connect(lambda title: show(tr("{title} was cancelled.").format(title=title)))
+    jobs.failed.connect(lambda message, details: show(message, "error", details))
     jobs.scan_read.connect(controllers.scans.on_scan_read)
     jobs.detected.connect(controllers.scans.on_detected)
     jobs.edited.connect(controllers.element_edits.on_edited)
-    jobs.written.connect(lambda path: tell(tr("Saved “{path}”.").format(path=path)))
+    jobs.written.connect(lambda path: show(tr("Saved “{path}”.").format(path=path)))
     if (autosave := controllers.autosave) is not None:
         jobs.detected.connect(lambda *_: autosave.save_copy())
         jobs.edited.connect(lambda _: autosave.save_copy())
@@ -293,7 +293,7 @@ def connect_jobs(window: MainWindow, session: Session, controllers: Controllers)
 
 def connect_crash_guard(guard: CrashGuard, session: Session, controllers: Controllers) -> None:
     """Connect unexpected exceptions to the message bar and the copy of unsaved work."""
-    guard.happened.connect(lambda message, details: session.tell(message, "error", details))
+    guard.happened.connect(lambda message, details: session.show_message(message, "error", details))
     if (autosave := controllers.autosave) is not None:
         guard.happened.connect(lambda *_: autosave.save_copy())
 

@@ -38,7 +38,7 @@ class Autosave(QObject):
     Parameters
     ----------
     session : Session
-        Tells the user.
+        Shows the offer of a recovery.
     folder : Path
         Where the copies are; it is made if it is not there.
     saving : JobQueue
@@ -124,7 +124,7 @@ class Autosave(QObject):
             if path == self.path or not lock.tryLock(0):
                 continue
             self._offered = path, lock
-            self._session.tell(
+            self._session.show_message(
                 tr("PipeGUI did not end properly last time. Unsaved work can be restored."),
                 "warning",
                 answers={tr("Restore"): self.recover, tr("Delete it"): self.discard},

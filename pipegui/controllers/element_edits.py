@@ -1,6 +1,6 @@
-"""Changing elements by hand: what the menus of the tree and of the window do.
+"""Edits and reviews of the selected elements.
 
-Targets are the selected elements. What needs the cloud's points runs in the background.
+Edits that need the cloud's points run in the background.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ from pipegui.work.job_queue import Edited
 from pipegui.work.worker import JobProgress
 
 NO_SIZE = mark("No nominal size")
-Reshape = Callable[[PointCloud, Result, JobProgress], Result]
+Edit = Callable[[PointCloud, Result, JobProgress], Result]
 
 
 class ElementEdits(QObject):
@@ -97,7 +97,7 @@ class ElementEdits(QObject):
 
         _, result, ids = self._targets()
         names = tr(" and ").join(label_of(result.element(i)) for i in ids)
-        self._reshape(
+        self._run_edit(
             tr("Merging"),
             tr("Merge {names}").format(names=names),
             lambda c, r, p: merge_elements(c, r, ids, p),
@@ -136,7 +136,7 @@ class ElementEdits(QObject):
     def _split_at(self, element_id: int, chainage: float) -> None:
         from pipecore.editing import split_element  # noqa: PLC0415 - loads numba
 
-        self._reshape(
+        self._run_edit(
             tr("Splitting"),
             tr("Split {label}").format(label=self._label(element_id)),
             lambda c, r, p: split_element(c, r, element_id, chainage, p),
@@ -162,7 +162,7 @@ class ElementEdits(QObject):
 
         _, result, _ = self._targets()
         if result.element(element_id).kind is not kind:
-            self._reshape(
+            self._run_edit(
                 tr("Measuring"),
                 tr("Change {label} to {kind}").format(label=self._label(element_id), kind=kind),
                 lambda c, r, p: change_kind(c, r, element_id, kind, p),
@@ -184,7 +184,7 @@ class ElementEdits(QObject):
             index = editing.points_around(cloud, result, ids)
             return editing.detect_again(cloud, result, index, settings, progress, ids)
 
-        self._reshape(
+        self._run_edit(
             tr("Detecting again"),
             tr("Detect again around {names}").format(names=names),
             change,
@@ -204,14 +204,15 @@ class ElementEdits(QObject):
             index = editing.points_in_box(cloud, box.low, box.high)
             return editing.detect_again(cloud, result, index, settings, progress)
 
-        self._reshape(
+        self._run_edit(
             tr("Detecting in the box"), tr("Detect again in the box"), change, expected=False
         )
 
     def on_edited(self, edited: Edited) -> None:
         """Take an edit that ran in the background, unless the result was changed meanwhile."""
-        if element_commands.place_of(self._session.document, edited.cloud, edited.before) is None:
-            self._session.tell(
+        document = self._session.document
+        if element_commands.scan_index_of(document, edited.cloud, edited.before) is None:
+            self._session.show_message(
                 tr(
                     "“{text}” was dropped: the elements were changed meanwhile. Do it again."
                 ).format(text=edited.text),
@@ -219,14 +220,14 @@ class ElementEdits(QObject):
             )
             return
         before, after = edited.before, edited.after
-        self._session.do(element_commands.take_edit, edited.cloud, before, after, edited.text)
-        self._session.tell(
+        self._session.do(element_commands.apply_edit, edited.cloud, before, after, edited.text)
+        self._session.show_message(
             tr("{text}: done. {difference}")
             .format(text=edited.text, difference=_difference(before, after))
             .strip()
         )
 
-    def _reshape(self, title: str, text: str, change: Reshape, *, expected: bool = True) -> None:
+    def _run_edit(self, title: str, text: str, edit: Edit, *, expected: bool = True) -> None:
         scan, result, _ = self._targets()
         cloud = scan.cloud
 
@@ -235,7 +236,7 @@ class ElementEdits(QObject):
 
             if expected:
                 progress.expect(STAGES)
-            return change(cloud, result, progress)
+            return edit(cloud, result, progress)
 
         self._session.jobs.edit(title, text, cloud, result, work)
 

@@ -88,9 +88,9 @@ def save_as(
         write(path)
     except (PipecoreError, OSError) as error:
         text = tr("“{path}” was not saved: {error}").format(path=path, error=error_text(error))
-        session.tell(text, "error")
+        session.show_message(text, "error")
     else:
-        session.tell(tr("Saved “{path}”.").format(path=path))
+        session.show_message(tr("Saved “{path}”.").format(path=path))
 
 
 def ask_report_folder(parent: QWidget, settings: QSettings, name: str) -> Path | None:

@@ -48,7 +48,7 @@ class Preferences(QObject):
         """Use another language from the next start on; "" is the system's."""
         self._session.stored.setValue("language", code)
         self.show_language()
-        self._session.tell(tr("The language changes at the next start."))
+        self._session.show_message(tr("The language changes at the next start."))
 
     def show_language(self) -> None:
         """Check the language chosen last."""

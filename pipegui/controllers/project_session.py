@@ -64,7 +64,9 @@ class ProjectSession(QObject):
         self._saved: tuple[Any, ...] = work_of(Document())
         self._may_lose = False
         self.saving = JobQueue(parent=self)
-        self.saving.failed.connect(lambda message, details: session.tell(message, "error", details))
+        self.saving.failed.connect(
+            lambda message, details: session.show_message(message, "error", details)
+        )
 
     # What is saved
 
@@ -124,7 +126,7 @@ class ProjectSession(QObject):
             self.path, self._saved = path, work_of(document)
             self._remember(path)
             self.show_title()
-            self._session.tell(tr("Saved “{path}”.").format(path=path))
+            self._session.show_message(tr("Saved “{path}”.").format(path=path))
             self.saved.emit()
             then()
 
@@ -328,9 +330,9 @@ class ProjectSession(QObject):
         self._replace_document(document, saved.camera, is_saved=is_whole)
         self._remember(saved.path)
         if is_whole:
-            self._session.tell(tr("Opened “{path}”.").format(path=saved.path))
+            self._session.show_message(tr("Opened “{path}”.").format(path=saved.path))
         else:
-            self._session.tell(
+            self._session.show_message(
                 tr("Some scans were left out; “Save” will ask for another file."), "warning"
             )
 
@@ -339,7 +341,7 @@ class ProjectSession(QObject):
         self.path = saved.recovered_from
         self._replace_document(saved.document(scans), saved.camera, is_saved=False)
         self.recovered.emit()
-        self._session.tell(tr("The unsaved work was restored. Save it now."), "warning")
+        self._session.show_message(tr("The unsaved work was restored. Save it now."), "warning")
 
     def _replace_document(self, document: Document, camera: Camera, *, is_saved: bool) -> None:
         self._saved = work_of(document) if is_saved else ()

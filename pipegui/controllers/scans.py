@@ -80,4 +80,4 @@ class Scans(QObject):
         active = session.document.scan
         scan = next((s for s in session.document.scans if s.cloud is cloud), None)
         whose = f"{scan.name}: " if scan is not None and scan is not active else ""
-        session.tell(f"{whose}{descriptions.summary(result)}{hint}.{took}", severity)
+        session.show_message(f"{whose}{descriptions.summary(result)}{hint}.{took}", severity)

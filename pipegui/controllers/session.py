@@ -60,7 +60,7 @@ class Session(QObject):
         try:
             self.history.do(command, *args, **kwargs)
         except PipecoreError as error:
-            self.tell(error_text(error), "warning")
+            self.show_message(error_text(error), "warning")
             self.refused.emit()
 
     def undo(self) -> None:
@@ -73,7 +73,7 @@ class Session(QObject):
         self.hide_message()
         self.history.redo()
 
-    def tell(
+    def show_message(
         self,
         text: str,
         severity: str = "info",

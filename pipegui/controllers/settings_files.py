@@ -27,7 +27,7 @@ class SettingsFiles:
         try:
             self._session.do(commands.load_settings, Settings.from_toml(path))
         except PipecoreError as error:
-            self._session.tell(error_text(error), "error")
+            self._session.show_message(error_text(error), "error")
 
     def save(self) -> None:
         """Ask for a file, and write the settings to it."""

@@ -1,4 +1,4 @@
-"""Between which heights or intensities the colours of the points run. Qt-free."""
+"""The range of heights or intensities that the colours of the points span."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from pipecore.types import PointCloud
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import ColourBy, Limits, ViewOptions
 
-# Ranges are of a whole cloud; kept while it is looked at.
+# Ranges are computed once for each cloud.
 
 
 @cached_with_owner(maxsize=4)
@@ -37,7 +37,7 @@ def intensity_limits(cloud: PointCloud, view: ViewOptions) -> Limits:
 
 
 def shown_limits(cloud: PointCloud, view: ViewOptions) -> Limits | None:
-    """Return the ends of the colours as they are told: heights in the world's metres.
+    """Return the ends of the colours as the window shows them: heights in world metres.
 
     None where colours have no such ends.
     """
@@ -51,6 +51,6 @@ def shown_limits(cloud: PointCloud, view: ViewOptions) -> Limits | None:
 
 
 def n_decimals(limits: Limits) -> int:
-    """How many decimals tell values between the limits apart."""
+    """Return how many decimals distinguish values between the limits."""
     span = abs(limits[1] - limits[0])
     return int(np.clip(2 - np.floor(np.log10(max(span, 1e-9))), 0, 4))

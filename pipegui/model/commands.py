@@ -1,7 +1,7 @@
 """What the user can do to a document: functions from a document to the next one.
 
-A command with `undo_text` is a step that can be undone; the others (looking, selecting)
-only move the present. Qt-free.
+A command with `undo_text` is a step that can be undone; the others (view, selection)
+change the present document only.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -15,7 +15,6 @@ from pipecore.settings import DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
 from pipegui.i18n.texts import mark
 from pipegui.model import presets
-from pipegui.model import selection as selecting
 from pipegui.model.document import (
     ColourBy,
     Document,
@@ -24,6 +23,16 @@ from pipegui.model.document import (
     Selection,
     Tool,
     ViewOptions,
+)
+from pipegui.model.selection import (
+    carry_over_reviews,
+    carry_over_selection,
+    elements_of,
+    selection_at_spot,
+    selection_of_deformation,
+    selection_of_element,
+    shown_profile,
+    worst_deformation,
 )
 
 Command = TypeVar("Command", bound=Callable[..., Document])
@@ -42,9 +51,12 @@ NEEDS_RESULT = {
 
 
 def step(undo_text: str | Callable[..., str]) -> Callable[[Command], Command]:
-    """Mark a command as a step of the history, with what its undoing is called.
+    """Mark a command as a step of the history, and name the step.
 
-    A function is given what the command is, before it is carried out.
+    Parameters
+    ----------
+    undo_text : str or callable
+        The name; a function gets the command's arguments before the command is carried out.
     """
 
     def marked(command: Command) -> Command:
@@ -59,19 +71,19 @@ def step(undo_text: str | Callable[..., str]) -> Callable[[Command], Command]:
 
 @step(mark("Open"))
 def open_scan(document: Document, scan: Scan) -> Document:
-    """Add a scan and look at it."""
+    """Add a scan and make it the active one."""
     return activate_scan(replace(document, scans=(*document.scans, scan)), len(document.scans))
 
 
 @step(mark("Close"))
 def close_scan(document: Document, index: int) -> Document:
-    """Remove a scan; the one before it is looked at."""
+    """Remove a scan; the one before it becomes active."""
     scans = document.scans[:index] + document.scans[index + 1 :]
     return activate_scan(replace(document, scans=scans, active=0), max(index - 1, 0))
 
 
 def activate_scan(document: Document, index: int) -> Document:
-    """Look at another scan."""
+    """Make another scan the active one."""
     document = replace(document, active=index, selection=Selection())
     view = replace(
         document.view,
@@ -92,28 +104,28 @@ def activate_scan(document: Document, index: int) -> Document:
 
 
 def step_scan(document: Document) -> Document:
-    """Look at the next open scan."""
+    """Make the next open scan the active one."""
     return activate_scan(document, (document.active + 1) % max(len(document.scans), 1))
 
 
 @step(mark("Detect"))
 def set_result(document: Document, cloud: PointCloud, result: Result) -> Document:
-    """Take the result of a detection on `cloud`; keeps the selection, else shows the worst dent.
+    """Set the result of a detection on `cloud`; keep the selection, else select the worst dent.
 
-    The scan may have been closed meanwhile: then nothing changes.
+    Nothing changes if the scan has been closed meanwhile.
     """
     index = next((i for i, scan in enumerate(document.scans) if scan.cloud is cloud), None)
     if index is None:
         return document
     old = document.scans[index].result
     scans = list(document.scans)
-    reviews = selecting.reviews_carried_over(scans[index].reviews, old, result)
+    reviews = carry_over_reviews(scans[index].reviews, old, result)
     scans[index] = replace(scans[index], result=result, reviews=reviews)
     selection = document.selection
     if index == document.active:
-        selection = selecting.carried_over(selection, old, result)
+        selection = carry_over_selection(selection, old, result)
         if selection == Selection():
-            selection = selecting.of_deformation(result, selecting.worst_deformation(result))
+            selection = selection_of_deformation(result, worst_deformation(result))
     view = document.view
     if index == document.active:
         colour = view.colour_by if view.colour_by in NEEDS_RESULT else ColourBy.DEVIATION
@@ -135,7 +147,7 @@ def set_review(document: Document, deformation_ids: Iterable[int], state: Review
 
 @step(mark("Comment"))
 def set_comment(document: Document, deformation_id: int, comment: str) -> Document:
-    """Say something about a deformation."""
+    """Set the comment on a deformation."""
     return _reviewed(document, {deformation_id: {"comment": comment.strip()}})
 
 
@@ -158,7 +170,7 @@ def _with_scan(document: Document, scan: Scan) -> Document:
 
 
 def colours_of(scan: Scan) -> tuple[ColourBy, ...]:
-    """What a scan's points can be coloured by, the most telling first."""
+    """Return what a scan's points can be coloured by, the most useful first."""
     has = {
         ColourBy.RGB: scan.cloud.rgb is not None,
         ColourBy.INTENSITY: scan.cloud.intensity is not None,
@@ -194,18 +206,18 @@ def select_element(document: Document, element_id: int) -> Document:
     """Select an element."""
     if document.result is None:
         return document
-    return select(document, selecting.of_element(document.result, element_id))
+    return select(document, selection_of_element(document.result, element_id))
 
 
 def select_deformation(document: Document, deformation_id: int) -> Document:
     """Select a deformation and its element."""
     if document.result is None:
         return document
-    return select(document, selecting.of_deformation(document.result, deformation_id))
+    return select(document, selection_of_deformation(document.result, deformation_id))
 
 
 def select_point(document: Document, point_index: int) -> Document:
-    """Select the element that a point of the cloud belongs to; nothing for -1."""
+    """Select the element of a point of the cloud; nothing for -1."""
     if document.result is None:
         return document
     element_id = NO_ID if point_index < 0 else int(document.result.element_id[point_index])
@@ -222,19 +234,19 @@ def select_spot(document: Document, chainage: float, clock: float) -> Document:
     """Select what is at a spot of the selected element's surface."""
     if document.result is None or not document.selection.element_id:
         return document
-    spot = selecting.of_spot(document.result, document.selection.element_id, chainage, clock)
+    spot = selection_at_spot(document.result, document.selection.element_id, chainage, clock)
     return select(document, spot)
 
 
 def select_parent(document: Document) -> Document:
-    """Go up: profile → deformation → element → run → nothing."""
+    """Select the parent: profile → deformation → element → run → nothing."""
     return select(document, document.selection.parent())
 
 
 def step_profile(document: Document, by: int) -> Document:
     """Select the next (+1) or previous (-1) profile of the stack that is shown."""
     result, selection = document.result, document.selection
-    shown = selecting.shown_profile(result, selection) if result else None
+    shown = shown_profile(result, selection) if result else None
     if result is None or shown is None:
         return document
     rows = result.profiles.of_element(selection.element_id, shown.stack_id)
@@ -264,46 +276,46 @@ def change_settings(document: Document, changes: Mapping[str, Any]) -> Document:
 
 @step(mark("Reset settings"))
 def reset_settings(document: Document) -> Document:
-    """Back to the defaults, own stacks excepted."""
+    """Reset all settings to their defaults, except the user's own stacks."""
     stacks = {"stacks.directions": document.settings.stacks.directions}
     return replace(document, settings=Settings().replace(stacks))
 
 
 @step(mark("Reset settings"))
 def reset_keys(document: Document, keys: Iterable[str]) -> Document:
-    """Set some settings back to their defaults, by dotted key."""
+    """Reset some settings to their defaults, by dotted key."""
     defaults = Settings()
     return change_settings(document, {key: defaults.get(key) for key in keys})
 
 
 @step(mark("Preset"))
 def apply_preset(document: Document, settings: Settings) -> Document:
-    """Take the settings of a preset; what belongs to the scan stays."""
+    """Apply a preset, except to settings that depend on the scan."""
     return replace(document, settings=presets.applied(document.settings, settings))
 
 
 @step(mark("Load settings"))
 def load_settings(document: Document, settings: Settings) -> Document:
-    """Take settings from elsewhere."""
+    """Replace all settings."""
     return replace(document, settings=settings)
 
 
 @step(mark("Change directions"))
 def set_preset(document: Document, preset: DirectionPreset) -> Document:
-    """Choose which stacks are cut besides the user's own."""
+    """Set which stacks are cut in addition to the user's own."""
     return change_settings(document, {"stacks.preset": preset})
 
 
 @step(mark("Add stack"))
 def add_stack(document: Document, direction: tuple[float, ...]) -> Document:
-    """Add an own stack: (x, y, z) or (x, y, z, width in mm)."""
+    """Add a stack of the user's own: (x, y, z) or (x, y, z, width in mm)."""
     directions = (*document.settings.stacks.directions, direction)
     return change_settings(document, {"stacks.directions": directions})
 
 
 @step(mark("Edit stack"))
 def edit_stack(document: Document, index: int, direction: tuple[float, ...]) -> Document:
-    """Change an own stack."""
+    """Change one of the user's own stacks."""
     directions = list(document.settings.stacks.directions)
     directions[index] = direction
     return change_settings(document, {"stacks.directions": tuple(directions)})
@@ -311,7 +323,7 @@ def edit_stack(document: Document, index: int, direction: tuple[float, ...]) -> 
 
 @step(mark("Remove stack"))
 def remove_stack(document: Document, index: int) -> Document:
-    """Remove an own stack."""
+    """Remove one of the user's own stacks."""
     directions = document.settings.stacks.directions
     directions = directions[:index] + directions[index + 1 :]
     return change_settings(document, {"stacks.directions": directions})
@@ -332,7 +344,7 @@ def show_stack(document: Document, stack_id: int) -> Document:
 
 
 def set_colour(document: Document, colour_by: ColourBy) -> Document:
-    """Choose what colour means; for profiles, the first stack if none is shown yet."""
+    """Set what points are coloured by; for profiles, the first stack if none is shown yet."""
     if colour_by is ColourBy.PROFILE and document.result is not None:
         stacks = document.result.stacks
         shown = document.view.shown_stack or (stacks[0].stack_id if stacks else NO_ID)
@@ -341,7 +353,7 @@ def set_colour(document: Document, colour_by: ColourBy) -> Document:
 
 
 def show_plot_stack(document: Document, stack_id: int) -> Document:
-    """Choose the stack of the radius plot; a selected profile of another stack is let go."""
+    """Set the stack of the radius plot; a selected profile of another stack is deselected."""
     document = set_view(document, plot_stack=stack_id)
     profile = document.selection.profile
     if profile is not None and profile.stack_id != stack_id:
@@ -350,7 +362,7 @@ def show_plot_stack(document: Document, stack_id: int) -> Document:
 
 
 def toggle_pin(document: Document) -> Document:
-    """Keep the selected element in the radius plot, or no more; the oldest of too many goes."""
+    """Pin the selected element in the radius plot, or unpin it; at most `MAX_PINNED` stay."""
     element_id, pinned = document.selection.element_id, document.view.pinned_elements
     if not element_id:
         return document
@@ -374,7 +386,7 @@ def isolate(document: Document) -> Document:
     result, selection = document.result, document.selection
     if result is None or selection == Selection():
         return document
-    kept = set(selecting.elements_of(result, selection))
+    kept = set(elements_of(result, selection))
     hidden = frozenset(e.element_id for e in result.elements) - kept
     return set_view(document, hidden_elements=hidden)
 
@@ -386,7 +398,7 @@ def show_all(document: Document) -> Document:
 
 
 def after_undo(present: Document, target: Document) -> Document:
-    """Return `target` seen as `present` is: undo changes the work, not where one looks."""
+    """Return `target` with the view and selection of `present`: undo changes the work only."""
     if present.scan is None or target.scan is None:
         return target
     if present.scan.cloud is not target.scan.cloud:
@@ -394,5 +406,5 @@ def after_undo(present: Document, target: Document) -> Document:
     view: ViewOptions = replace(present.view, hidden_elements=target.view.hidden_elements)
     if view.colour_by not in colours_of(target.scan):
         view = replace(view, colour_by=target.view.colour_by, shown_stack=NO_ID)
-    selection = selecting.carried_over(present.selection, present.result, target.result)
+    selection = carry_over_selection(present.selection, present.result, target.result)
     return replace(target, view=view, selection=selection)

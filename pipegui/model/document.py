@@ -1,7 +1,7 @@
 """What the user works on: scans, results, selection and view options, all immutable.
 
 A command takes a `Document` and returns the next one; undo is going back to an
-earlier one. Nothing here knows Qt or VTK.
+earlier one.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ class Choice(StrEnum):
 
 
 class ColourBy(Choice):
-    """What the points' colour means."""
+    """What points are coloured by."""
 
     SEGMENT = "Segment"
     ELEMENT = "Element"
@@ -32,7 +32,7 @@ class ColourBy(Choice):
 
 
 class Background(Choice):
-    """What lies behind the points."""
+    """Background of the 3D view."""
 
     SYSTEM = "System"
     LIGHT = "Light"
@@ -80,7 +80,7 @@ class ProfileKey:
 
 @dataclass(frozen=True)
 class Selection:
-    """The one thing that is selected, with what contains it.
+    """What is selected, with what contains it.
 
     A selected profile or deformation implies its element; a selected element its run.
     """
@@ -90,11 +90,11 @@ class Selection:
     deformation_id: int = NO_ID
     profile: ProfileKey | None = None
     others: frozenset[int] = frozenset()
-    """More elements, for what is done with several; everything is shown of `element_id`."""
+    """More elements, for edits of several; plots and properties show `element_id`."""
 
     @property
     def lead(self) -> "Selection":
-        """The one thing that is looked at, without the others."""
+        """The selection without the others."""
         return replace(self, others=frozenset())
 
     def parent(self) -> "Selection":
@@ -153,31 +153,31 @@ class ViewOptions:
     tool: Tool = Tool.SELECT
     measurements: tuple[Measurement, ...] = ()
     measuring_from: Point | None = None
+    """The first of two points, while the second is still to be picked."""
     height_limits: Limits | None = None
-    """Local heights at the ends of the colours, metres; None: what nearly all points keep to."""
+    """Local heights at the ends of the colours, metres; None: the range of nearly all points."""
     intensity_limits: Limits | None = None
     """The same for intensities."""
-    """The first of two points, while the second is still to be picked."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """A cloud with the result of its last detection, if any, and what a person says of it."""
+    """A cloud with the result of its last detection, if any, and a person's reviews of it."""
 
     name: str
     cloud: PointCloud
     result: Result | None = None
     reviews: Mapping[int, Review] = field(default_factory=dict)
-    """By the ids of the deformations; those that nobody has looked at are not in it."""
+    """By the ids of the deformations; those without a review are not in it."""
 
     length_unit: LengthUnit = LengthUnit.METRE
-    """In which the file was read."""
+    """Unit in which the file was read."""
 
     fingerprint: Fingerprint | None = None
-    """Of the file when the cloud was read; None if nobody took it."""
+    """Of the file when the cloud was read, if it was taken."""
 
     def review(self, deformation_id: int) -> Review:
-        """Return what a person said of a deformation, or that it is open."""
+        """Return the review of a deformation, an open one if there is none."""
         return self.reviews.get(deformation_id, Review())
 
 
@@ -193,10 +193,10 @@ class Document:
 
     @property
     def scan(self) -> Scan | None:
-        """The scan that is looked at."""
+        """The active scan."""
         return self.scans[self.active] if self.scans else None
 
     @property
     def result(self) -> Result | None:
-        """The result that is looked at."""
+        """The result of the active scan."""
         return self.scan.result if self.scan else None

@@ -1,6 +1,6 @@
-"""What the user changes by hand in a result: commands as in `pipegui.model.commands`.
+"""Edits of a result: commands as in `pipegui.model.commands`.
 
-What needs the cloud's points is worked out elsewhere and taken by `take_edit`. Qt-free.
+Edits that need the cloud's points are computed in the background and applied by `apply_edit`.
 """
 
 from collections.abc import Collection, Iterable
@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from pipecore.types import NO_ID, NominalSize, PointCloud, Result
 from pipegui.i18n.texts import label_of, mark, run_label, tr
-from pipegui.model import selection as selecting
 from pipegui.model.commands import step
 from pipegui.model.document import Document, Scan
+from pipegui.model.selection import carry_over_reviews, carry_over_selection
 
 
 def _names(document: Document, element_ids: Iterable[int]) -> str:
@@ -24,12 +24,14 @@ def _names(document: Document, element_ids: Iterable[int]) -> str:
     lambda document, element_ids: tr("Delete {names}").format(names=_names(document, element_ids))
 )
 def delete_elements(document: Document, element_ids: Collection[int]) -> Document:
-    """Take elements away, with their deformations."""
-    from pipecore.editing import delete_elements as deleted  # noqa: PLC0415 - loads numba
+    """Delete elements and their deformations."""
+    from pipecore import editing  # noqa: PLC0415 - loads numba
 
     if document.result is None or not element_ids:
         return document
-    return _with_result(document, document.active, deleted(document.result, element_ids))
+    return _with_result(
+        document, document.active, editing.delete_elements(document.result, element_ids)
+    )
 
 
 @step(
@@ -38,7 +40,7 @@ def delete_elements(document: Document, element_ids: Collection[int]) -> Documen
     )
 )
 def rename_element(document: Document, element_id: int, name: str) -> Document:
-    """Call an element by a name; "" goes back to its kind and number."""
+    """Name an element; "" restores its kind and number."""
     from pipecore.editing import name_element  # noqa: PLC0415 - loads numba
 
     if document.result is None or label_of(document.result.element(element_id)) == name.strip():
@@ -52,7 +54,7 @@ def rename_element(document: Document, element_id: int, name: str) -> Document:
     )
 )
 def rename_run(document: Document, run_id: int, name: str) -> Document:
-    """Call a run by a name; "" goes back to its number."""
+    """Name a run; "" restores its number."""
     from pipecore.editing import name_run  # noqa: PLC0415 - loads numba
 
     if document.result is None or run_label(document.result, run_id) == name.strip():
@@ -66,17 +68,19 @@ def rename_run(document: Document, run_id: int, name: str) -> Document:
     )
 )
 def set_nominal_size(document: Document, element_id: int, size: NominalSize | None) -> Document:
-    """Say which catalogue size an element has."""
-    from pipecore.editing import set_nominal_size as sized  # noqa: PLC0415 - loads numba
+    """Set the catalogue size of an element."""
+    from pipecore import editing  # noqa: PLC0415 - loads numba
 
     if document.result is None or document.result.element(element_id).nominal == size:
         return document
-    return _with_result(document, document.active, sized(document.result, element_id, size))
+    return _with_result(
+        document, document.active, editing.set_nominal_size(document.result, element_id, size)
+    )
 
 
 @step(mark("Rename scan"))
 def rename_scan(document: Document, index: int, name: str) -> Document:
-    """Call a scan by another name; its file keeps its own."""
+    """Rename a scan; its file keeps its name."""
     name = " ".join(name.split())
     if not name or name == document.scans[index].name:
         return document
@@ -84,23 +88,23 @@ def rename_scan(document: Document, index: int, name: str) -> Document:
 
 
 @step(lambda document, cloud, before, after, text: text)
-def take_edit(
+def apply_edit(
     document: Document, cloud: PointCloud, before: Result, after: Result, text: str
 ) -> Document:
-    """Take what became of a result; nothing changes if it is no longer the scan's."""
-    index = place_of(document, cloud, before)
+    """Replace a scan's result by an edited one, unless it has been changed meanwhile."""
+    index = scan_index_of(document, cloud, before)
     return document if index is None else _with_result(document, index, after)
 
 
-def place_of(document: Document, cloud: PointCloud, result: Result) -> int | None:
-    """Return which scan has this cloud and result, None if there is none."""
+def scan_index_of(document: Document, cloud: PointCloud, result: Result) -> int | None:
+    """Return the index of the scan with this cloud and result, None if there is none."""
     return next(
         (i for i, s in enumerate(document.scans) if s.cloud is cloud and s.result is result), None
     )
 
 
 def mark_elements(document: Document, element_ids: Iterable[int]) -> Document:
-    """Select more elements besides the selected one, to do something with all of them."""
+    """Select more elements in addition to the selected one."""
     selection = document.selection
     others = frozenset(element_ids) - {selection.element_id, NO_ID}
     if not selection.element_id or others == selection.others:
@@ -117,7 +121,7 @@ def _with_scan(document: Document, index: int, scan: Scan) -> Document:
 def _with_result(document: Document, index: int, result: Result) -> Document:
     """A scan with its result changed by hand: what was not touched stays selected and hidden."""
     scan = document.scans[index]
-    reviews = selecting.reviews_carried_over(scan.reviews, scan.result, result)
+    reviews = carry_over_reviews(scan.reviews, scan.result, result)
     changed = _with_scan(document, index, replace(scan, result=result, reviews=reviews))
     if index != document.active:
         return changed
@@ -125,7 +129,7 @@ def _with_result(document: Document, index: int, result: Result) -> Document:
     view = document.view
     return replace(
         changed,
-        selection=selecting.carried_over(document.selection, scan.result, result),
+        selection=carry_over_selection(document.selection, scan.result, result),
         view=replace(
             view,
             hidden_elements=view.hidden_elements & ids,

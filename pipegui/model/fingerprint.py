@@ -1,16 +1,16 @@
-"""What a file is known again by, without reading all of it. Qt-free."""
+"""Fingerprints of files: a hash of samples, so that not all of a file is read."""
 
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
 N_SAMPLES, SAMPLE_BYTES = 32, 65_536
-"""A fingerprint takes this many samples of a file."""
+"""Number and size of the samples."""
 
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """What a file is known again by."""
+    """Size and sampled content of a file."""
 
     size: int
     mtime_ns: int
@@ -37,7 +37,7 @@ class Fingerprint:
             return None
 
     def fits(self, path: Path) -> bool:
-        """Whether a file holds the same; that it was copied or touched does not matter."""
+        """Return whether a file has the same content, even if it was copied or touched."""
         if path.stat().st_size != self.size:
             return False
         return Fingerprint.of(path).sample_hash == self.sample_hash

@@ -1,4 +1,4 @@
-"""The present document and the ones before and after it: do, undo, redo. Qt-free."""
+"""The present document and the ones before and after it: do, undo, redo."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ class Revision:
 
 
 BUDGET_BYTES = 2 << 30
-"""The first steps are forgotten where going back to them holds more memory than this."""
+"""The oldest steps are dropped where they hold more memory than this."""
 
 
 class History:
@@ -54,13 +54,13 @@ class History:
         self._show(after)
 
     def reset(self, document: Document) -> None:
-        """Begin anew with another document."""
+        """Replace the document and clear the history."""
         self._past.clear()
         self._future.clear()
         self._show(document)
 
     def _extra_bytes(self, present: Document) -> int:
-        """Memory of the arrays by point that only the steps hold."""
+        """Memory of the arrays by point that only past documents hold."""
         own = _arrays_of(present)
         held: dict[int, int] = {}
         for revision in self._past:
@@ -115,7 +115,7 @@ class History:
 
 
 def _arrays_of(document: Document) -> dict[int, int]:
-    """Sizes in bytes of a document's arrays by point, by what tells them apart."""
+    """Sizes in bytes of a document's arrays by point, by the identity of the array."""
     arrays: list[NDArray[Any]] = []
     for scan in document.scans:
         arrays.append(scan.cloud.xyz)

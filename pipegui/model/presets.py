@@ -1,7 +1,7 @@
-"""Settings kept by name: those that come with the program, and the user's own. Qt-free.
+"""Named settings: those that come with the program, and the user's own.
 
-A preset is a TOML file of settings. It says nothing of the file's length unit and of own
-stacks, which belong to a scan: choosing one leaves them as they are.
+A preset is a TOML file of settings, without the length unit and the user's own stacks,
+which depend on the scan: applying a preset leaves them as they are.
 """
 
 import re
@@ -16,8 +16,8 @@ from pipecore.resources import resource
 from pipecore.settings import Settings
 from pipegui.i18n.texts import mark, tr
 
-OF_THE_SCAN = ("input.length_unit", "stacks.directions")
-"""Settings that no preset touches."""
+SCAN_SETTINGS = ("input.length_unit", "stacks.directions")
+"""Settings that depend on the scan; no preset has them."""
 STANDARD = "Standard"
 
 
@@ -47,12 +47,12 @@ class Preset:
 
 
 def applied(present: Settings, preset: Settings) -> Settings:
-    """Return a preset's settings with what belongs to the scan as it is at present."""
-    return preset.replace({key: present.get(key) for key in OF_THE_SCAN})
+    """Return the settings after a preset is applied: those of the scan stay as they are."""
+    return preset.replace({key: present.get(key) for key in SCAN_SETTINGS})
 
 
 class Presets:
-    """The presets there are; the user's own lie in `folder`."""
+    """The presets of the program, and the user's own, which are in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -74,12 +74,12 @@ class Presets:
             try:
                 if applied(settings, preset.load()) == settings:
                     return preset
-            except SettingsError:  # told when it is chosen
+            except SettingsError:  # reported when it is chosen
                 continue
         return None
 
     def objection(self, name: str) -> str:
-        """Say why settings cannot be kept under a name; "" if they can."""
+        """Return why a preset cannot have a name; "" if it can."""
         name = name.strip()
         if not name:
             return tr("Give it a name.")
@@ -93,12 +93,12 @@ class Presets:
         )
 
     def save(self, name: str, settings: Settings) -> Preset:
-        """Keep settings under a name, in place of what it meant before.
+        """Save settings as a preset, replacing one of that name.
 
         Raises
         ------
         SettingsError
-            If the name will not do.
+            If the name is not allowed.
         WriteError
             If the file cannot be written.
         """
@@ -107,7 +107,7 @@ class Presets:
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{name.strip()}.toml"
         content = settings.to_dict()
-        for key in OF_THE_SCAN:
+        for key in SCAN_SETTINGS:
             group, field = key.split(".")
             del content[group][field]
         with write_file(path) as temporary:
@@ -121,12 +121,12 @@ class Presets:
 
 
 def _display_name(path: Path) -> str:
-    """The name of a preset that comes with the program, from its file's name."""
+    """Return the name of a preset of the program, from its file's name."""
     return path.stem.replace("-", " ").capitalize()
 
 
 def _first_comment(path: Path) -> str:
-    """What the comment at the top of a file says."""
+    """Return the comment at the top of a file."""
     lines = path.read_text(encoding="utf-8").splitlines()
     comment = []
     for line in lines:

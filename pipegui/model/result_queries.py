@@ -1,7 +1,6 @@
 """Parts of a result: the profiles, points and deformations of one element.
 
-Made once and kept for the few elements last looked at, because equality of view states
-stands on their identity. Results themselves live in the history. Qt-free.
+Computed once for each result, because view states compare them by identity.
 """
 
 from functools import lru_cache
@@ -61,7 +60,7 @@ def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | N
 
 @cached_with_owner(maxsize=32)
 def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
-    """Stacks with profiles of this element: its own first, then by number of profiles."""
+    """Return stacks with profiles of an element: the normal stack first, then by number."""
     ids, counts = np.unique(profiles_of(result, element_id).stack_id, return_counts=True)
     choices = [
         (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
@@ -71,7 +70,7 @@ def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int]
 
 @cached_with_owner(maxsize=32)
 def plotted_profiles(result: Result, element_id: int) -> Profiles:
-    """Profiles of an element's own stack, or of that with most of them."""
+    """Return the profiles of an element's normal stack, else of the stack with most of them."""
     rows, choices = profiles_of(result, element_id), stack_choices(result, element_id)
     return rows[rows.stack_id == choices[0][0]] if choices else rows
 
@@ -92,7 +91,7 @@ def dent_limit(result: Result, element_id: int) -> DentLimit | None:
 
 
 def stack_name(result: Result, stack_id: int) -> str:
-    """What people call a stack."""
+    """Return the name of a stack."""
     if stack_id == OWN_STACK:
         return tr("Across the axis")
     stack = next((s for s in result.stacks if s.stack_id == stack_id), None)

@@ -1,6 +1,6 @@
-"""Ways to arrive at a selection: from an id, a point, a spot on the map, another result.
+"""Selections: of an id, of a spot on the surface, and of the same thing in another result.
 
-Qt-free. A selection always carries what contains it, so nobody has to look it up.
+A selection always has what contains it: run, element.
 """
 
 from collections.abc import Mapping
@@ -13,14 +13,14 @@ from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, 
 from pipegui.model.document import ProfileKey, Selection
 
 
-def of_element(result: Result, element_id: int) -> Selection:
+def selection_of_element(result: Result, element_id: int) -> Selection:
     """Select an element, or nothing for `NO_ID`."""
     if not element_id:
         return Selection()
     return Selection(run_id=result.element(element_id).run_id, element_id=element_id)
 
 
-def of_deformation(result: Result, deformation_id: int) -> Selection:
+def selection_of_deformation(result: Result, deformation_id: int) -> Selection:
     """Select a deformation on its element, or nothing for `NO_ID`."""
     if not deformation_id:
         return Selection()
@@ -29,7 +29,7 @@ def of_deformation(result: Result, deformation_id: int) -> Selection:
     return Selection(run_id, element_id, deformation_id)
 
 
-def of_spot(result: Result, element_id: int, chainage: float, clock: float) -> Selection:
+def selection_at_spot(result: Result, element_id: int, chainage: float, clock: float) -> Selection:
     """Select what is at a spot of an element's surface: a deformation, else the profile there."""
     element = result.element(element_id)
     radius = float(element.radius_at(chainage))
@@ -37,7 +37,7 @@ def of_spot(result: Result, element_id: int, chainage: float, clock: float) -> S
         off_peak = abs((clock - deformation.clock + np.pi) % (2 * np.pi) - np.pi) * radius
         is_along = deformation.chainage_start <= chainage <= deformation.chainage_end
         if is_along and off_peak <= deformation.width / 2:
-            return of_deformation(result, deformation.deformation_id)
+            return selection_of_deformation(result, deformation.deformation_id)
     profile = nearest_profile(result, element_id, chainage)
     return Selection(element.run_id, element_id, profile=profile)
 
@@ -71,11 +71,11 @@ def shown_profile(result: Result, selection: Selection) -> ProfileKey | None:
 
 
 def worst_deformation(result: Result) -> int:
-    """Id of the deformation to look at first, `NO_ID` if there are none."""
+    """Return the id of the most urgent deformation, `NO_ID` if there are none."""
     return by_verdict(result)[0].deformation_id if result.deformations else NO_ID
 
 
-def carried_over(selection: Selection, old: Result | None, new: Result | None) -> Selection:
+def carry_over_selection(selection: Selection, old: Result | None, new: Result | None) -> Selection:
     """Return the same selection in another result of the same cloud, as far as it is there."""
     if old is new:
         return selection
@@ -87,11 +87,11 @@ def carried_over(selection: Selection, old: Result | None, new: Result | None) -
     twin = _same_element(element, new)
     if twin is None:
         return Selection()
-    kept = of_element(new, twin.element_id)
+    kept = selection_of_element(new, twin.element_id)
     if selection.deformation_id:
         same = _same_deformation(old.deformation(selection.deformation_id), twin, new)
         if same is not None:
-            kept = of_deformation(new, same.deformation_id)
+            kept = selection_of_deformation(new, same.deformation_id)
     if selection.profile is not None:
         rows = old.profiles.of_element(element.element_id, selection.profile.stack_id)
         row = rows.profile_index == selection.profile.profile_index
@@ -110,7 +110,7 @@ def _same_run(run_id: int, old: Result, new: Result) -> int:
     return next((twin.run_id for twin in twins if twin is not None), NO_ID)
 
 
-def reviews_carried_over(
+def carry_over_reviews(
     reviews: Mapping[int, Review], old: Result | None, new: Result
 ) -> Mapping[int, Review]:
     """Return what was said of deformations for those that are found again."""

@@ -1,4 +1,4 @@
-"""What the user can do to the 3D view, beside the commands on scans and results. Qt-free."""
+"""Commands on the 3D view: clicks and measurements, clip box, colours, profiles of a stack."""
 
 from dataclasses import replace
 
@@ -38,7 +38,7 @@ def set_limits(document: Document, limits: Limits) -> Document:
 
 
 def fit_limits(document: Document) -> Document:
-    """Choose limits that hold nearly all points; of deviations 98 %, in steps of 0.5 mm."""
+    """Set limits that hold nearly all points; of deviations 98 %, in steps of 0.5 mm."""
     if document.view.colour_by is ColourBy.HEIGHT:
         return set_view(document, height_limits=None)
     if document.view.colour_by is ColourBy.INTENSITY:
@@ -58,14 +58,14 @@ def fit_limits(document: Document) -> Document:
 
 
 def choose_tool(document: Document, tool: Tool) -> Document:
-    """Choose what a click does; the tool that is chosen already is put away."""
+    """Choose what a click does; choosing the chosen tool again goes back to selecting."""
     if document.view.tool is tool:
         tool = Tool.SELECT
     return set_view(document, tool=tool, measuring_from=None)
 
 
 def click_point(document: Document, point_index: int) -> Document:
-    """Do with a point of the cloud what the tool does; -1 is beside all points."""
+    """Use the chosen tool on a point of the cloud; -1 is a click beside all points."""
     view = document.view
     if view.tool is Tool.SELECT:
         return select_point(document, point_index)
@@ -80,7 +80,7 @@ def click_point(document: Document, point_index: int) -> Document:
 
 
 def escape(document: Document) -> Document:
-    """Give up the point, then the tool; else go up in what is selected."""
+    """Give up the first point of a measurement, else the tool, else select the parent."""
     if document.view.measuring_from is not None:
         return set_view(document, measuring_from=None)
     if document.view.tool is not Tool.SELECT:

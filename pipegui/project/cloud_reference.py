@@ -1,4 +1,4 @@
-"""Clouds named by their files, and known again by what is in them. Qt-free."""
+"""References to the files of clouds: path and fingerprint."""
 
 import os
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from pipegui.model.fingerprint import Fingerprint
 
 
 class CloudState(Enum):
-    """What became of a cloud since the project was saved."""
+    """State of a cloud's file since the project was saved."""
 
     FOUND = "found"
     CHANGED = "changed"
@@ -22,7 +22,7 @@ class CloudState(Enum):
 
 @dataclass(frozen=True)
 class CloudReference:
-    """Where a cloud is, and what it is known by."""
+    """Where a cloud's file is, and what was in it."""
 
     path: Path
     relative: str
@@ -35,8 +35,8 @@ class CloudReference:
     def to(cls, scan: Scan, folder: Path) -> "CloudReference":
         """Refer to the cloud of a scan from a project's folder; `WriteError` if it has no file.
 
-        The file is known again as it was when the cloud was read: what became of it since
-        is another cloud.
+        The fingerprint is that of the file when the cloud was read: if it has been changed
+        since, it holds another cloud.
         """
         source = scan.cloud.source
         if source is None:

@@ -4,7 +4,7 @@ A project is a zip archive of ``project.json`` and NumPy arrays (``.npy``, never
 pickled): format version 2. ``project.json`` holds what is small, the arrays of scan `i`
 lie in ``scans/i``: ``segment_id``, ``element_id`` and ``deviation`` by point, and the
 columns of the profiles in ``profiles``. A cloud is named by its path, relative to the
-project where that can be, and known again by its fingerprint. Keys may be added within
+project where that can be, with a fingerprint of what is in it. Keys may be added within
 a version; a reader refuses a larger one. Version 1 named classes of the program, and
 choices of the view by the words shown.
 """
@@ -110,7 +110,7 @@ class SavedProject:
     view: ViewOptions = ViewOptions()
     camera: Camera = field(default_factory=dict)
     recovered_from: Path | None = None
-    """The project that an autosaved one belongs to."""
+    """The project that an autosaved copy was made of."""
 
     def located(self) -> list[tuple[Path, CloudState]]:
         """Find the cloud of each scan."""

@@ -29,7 +29,6 @@ from pipecore.types import (
     Stack,
 )
 from pipegui.model import colour_limits, result_queries
-from pipegui.model import selection as selecting
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import (
     Box,
@@ -42,6 +41,7 @@ from pipegui.model.document import (
     Selection,
     ViewOptions,
 )
+from pipegui.model.selection import shown_profile
 from pipegui.states.preview_state import PlanningState
 
 Array = NDArray[np.float64]
@@ -277,7 +277,7 @@ def resolve(document: Document) -> ViewState:
             if profile is not None:
                 args = result, scan.cloud, selection.element_id, selection.profile
                 profile_xyz = result_queries.points_of_profile(*args)
-        shown = selecting.shown_profile(result, selection)
+        shown = shown_profile(result, selection)
     return ViewState(
         window=WindowState(
             scan,

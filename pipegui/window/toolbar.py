@@ -20,7 +20,7 @@ class ToolBar(QToolBar):
     colour_chosen = Signal(object)
     limit_chosen = Signal(float)
     limits_chosen = Signal(object)
-    """Low and high end of the colours, as `WindowState` tells them."""
+    """Low and high end of the colours, as in `WindowState.limits`."""
 
     def __init__(self, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Tools", parent)
@@ -48,14 +48,14 @@ class ToolBar(QToolBar):
         self.colour.setAccessibleName(tr("Colour by"))
         self.colour.setToolTip(tr("What the colour of the points means"))
         self.colour.setSizeAdjustPolicy(QuietComboBox.SizeAdjustPolicy.AdjustToContents)
-        self.colour.currentIndexChanged.connect(self._tell_colour)
+        self.colour.currentIndexChanged.connect(self._emit_colour)
         self.limit = QuietSpinBox()
         self.limit.setAccessibleName(tr("Deviation range"))
         self.limit.setToolTip(tr("Deviations from − to + this are told apart by colour"))
         self.limit.setRange(0.5, 500)
         self.limit.setPrefix("± ")
         self.limit.setSuffix(" mm")
-        self.limit.valueChanged.connect(self._tell_limit)
+        self.limit.valueChanged.connect(self._emit_limit)
         self.addWidget(QLabel(tr("Colour by")))
         self.addWidget(self.colour)
         self._limit_label = self.addWidget(QLabel(tr("Range")))
@@ -70,7 +70,7 @@ class ToolBar(QToolBar):
             field.setRange(-1e9, 1e9)
             field.setButtonSymbols(QuietSpinBox.ButtonSymbols.NoButtons)
             field.setFixedWidth(11 * theme.SPACING)
-            field.valueChanged.connect(lambda value, end=end: self._tell_end(end, value))
+            field.valueChanged.connect(lambda value, end=end: self._emit_end(end, value))
             if self._end_actions:
                 self._end_actions.append(self.addWidget(QLabel("–")))
             self._end_actions.append(self.addWidget(field))
@@ -109,16 +109,16 @@ class ToolBar(QToolBar):
             field.setSuffix(" m" if is_height else "")
             field.setValue(value)
 
-    def _tell_end(self, end: int, value: float) -> None:
+    def _emit_end(self, end: int, value: float) -> None:
         """Move one end; the other keeps what its field rounds."""
         if not self._applying and self._limits is not None:
             low, high = self._limits
             self.limits_chosen.emit((low, value) if end else (value, high))
 
-    def _tell_colour(self) -> None:
+    def _emit_colour(self) -> None:
         if not self._applying:
             self.colour_chosen.emit(ColourBy(self.colour.currentData()))
 
-    def _tell_limit(self, limit: float) -> None:
+    def _emit_limit(self, limit: float) -> None:
         if not self._applying:
             self.limit_chosen.emit(limit)

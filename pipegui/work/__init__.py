@@ -1,1 +1,1 @@
-"""What runs beside the window: worker, job queue, previews, kernel warm-up, crash guard."""
+"""What runs in the background: worker, job queue, previews, kernel warm-up, crash guard."""

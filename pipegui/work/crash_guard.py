@@ -1,4 +1,4 @@
-"""Exceptions that nobody expected: told in the window, and never the end of the session."""
+"""Unexpected exceptions: shown in the window, without ending the program."""
 
 import platform
 import sys
@@ -13,7 +13,7 @@ from pipegui.i18n.texts import tr
 
 
 class CrashGuard(QObject):
-    """Takes what Python would only print, from any thread, while it is installed."""
+    """Reports exceptions that Python would only print, from any thread, while it is installed."""
 
     happened = Signal(str, str)
     """Message, and details for a bug report; in the window's thread."""
@@ -23,29 +23,29 @@ class CrashGuard(QObject):
         self._hooks = sys.excepthook, threading.excepthook
 
     def install(self) -> None:
-        """Take exceptions from now on; they are printed as well."""
+        """Report exceptions from now on; they are printed as well."""
         self._hooks = sys.excepthook, threading.excepthook
-        sys.excepthook = self.take
-        threading.excepthook = self._take_from_thread
+        sys.excepthook = self.report
+        threading.excepthook = self._report_from_thread
 
     def uninstall(self) -> None:
-        """Leave exceptions to whom they were left before."""
+        """Restore the hooks that were there before."""
         sys.excepthook, threading.excepthook = self._hooks
 
-    def take(
+    def report(
         self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
     ) -> None:
-        """Tell of an exception."""
+        """Report an exception of the main thread."""
         self._hooks[0](kind, error, trace)
         if issubclass(kind, Exception):
-            self._tell(kind, error, trace)
+            self._report(kind, error, trace)
 
-    def _take_from_thread(self, args: threading.ExceptHookArgs) -> None:
+    def _report_from_thread(self, args: threading.ExceptHookArgs) -> None:
         self._hooks[1](args)
         if issubclass(args.exc_type, Exception) and args.exc_value is not None:
-            self._tell(args.exc_type, args.exc_value, args.exc_traceback)
+            self._report(args.exc_type, args.exc_value, args.exc_traceback)
 
-    def _tell(
+    def _report(
         self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
     ) -> None:
         message = tr(
@@ -57,7 +57,7 @@ class CrashGuard(QObject):
 
 
 def describe_system() -> str:
-    """Say which program this is, on what."""
+    """Return versions of program, Python, Qt and operating system."""
     return (
         f"PipeGUI {pipecore.__version__}, Python {platform.python_version()}, "
         f"Qt {qVersion()}, {platform.platform()}"

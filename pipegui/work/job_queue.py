@@ -1,6 +1,6 @@
 """The long work of the window: reading, detecting, writing a report.
 
-Requests wait for one another. What a job makes is handed on as a signal; nothing here
+Requests run one after the other. The value of a job is emitted as a signal; nothing here
 knows the document.
 """
 
@@ -57,7 +57,7 @@ def detect_pipes(cloud: PointCloud, settings: Settings, progress: JobProgress) -
 
 @dataclass(frozen=True, eq=False)
 class Edited:
-    """What became of a scan's result when it was changed by hand; `text` says what was done."""
+    """A scan's result before and after an edit; `text` names the edit."""
 
     cloud: PointCloud
     before: Result
@@ -66,7 +66,7 @@ class Edited:
 
 
 Change = Callable[[JobProgress], Result]
-"""Works out the next result."""
+"""Computes the next result."""
 
 
 def plan_cuts(cloud: PointCloud, settings: Settings, progress: JobProgress) -> "Plan | None":
@@ -140,17 +140,17 @@ class JobQueue(QObject):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something that was asked for runs or waits; idle work does not count."""
+        """Whether requested work runs or waits; idle work does not count."""
         return self._is_requested_work or bool(self._waiting)
 
     @property
     def _is_requested_work(self) -> bool:
-        """Whether what runs was asked for."""
+        """Whether what runs was requested, and is not idle work."""
         return self._running is not None and not self._running.is_idle_work
 
     @property
     def title(self) -> str:
-        """What is being done that was asked for; "" while nothing is."""
+        """Title of the requested work that runs or is next; "" for none."""
         if self._running is not None and self._is_requested_work:
             return self._running.title
         return self._waiting[0].title if self._waiting else ""
@@ -174,7 +174,7 @@ class JobQueue(QObject):
 
     def _parallel_queue(self) -> "JobQueue":
         if self._running is not None and self._running.is_idle_work:
-            return self  # it makes way
+            return self  # it is cancelled
         if self._parallel is None:
             self._parallel = JobQueue(parent=self)
             self._parallel.started.connect(self.parallel_changed)
@@ -194,7 +194,7 @@ class JobQueue(QObject):
     def edit(
         self, title: str, text: str, cloud: PointCloud, before: Result, change: Change
     ) -> None:
-        """Change a result by hand, where that takes its time."""
+        """Run an edit of a result."""
 
         def done(after: Result) -> None:
             self.edited.emit(Edited(cloud, before, after, text))
@@ -204,11 +204,11 @@ class JobQueue(QObject):
     def run(
         self, title: str, work: Callable[[JobProgress], Any], done: Callable[[Any], None]
     ) -> None:
-        """Do anything else that takes its time, and hand what it makes to `done`."""
+        """Run any other work, and hand its value to `done`."""
         self._request(_Request(title, work, done))
 
     def write(self, path: Path, write: Callable[[JobProgress], None]) -> None:
-        """Write something that takes its time."""
+        """Run an export to a path."""
         self._request(_Request(tr("Exporting"), write, lambda _: self.written.emit(path)))
 
     def run_when_idle(
@@ -217,9 +217,16 @@ class JobQueue(QObject):
         done: Callable[[Any], None],
         failed: Callable[[str], None],
     ) -> None:
-        """Do something small once nothing else runs; only the caller hears of it.
+        """Run short work once nothing else runs; only the caller is notified.
 
-        Newer idle work takes its place, and work that was asked for goes before it.
+        Newer idle work replaces it, and requested work cancels it; then it runs again later.
+
+        Parameters
+        ----------
+        work : callable
+            Runs in the worker's thread.
+        done, failed : callable
+            Take its value, or the message of its error.
         """
         self._idle_work = _Request("", work, done, failed)
         if self._running is None:
@@ -228,7 +235,7 @@ class JobQueue(QObject):
             self.worker.cancel()
 
     def cancel(self) -> None:
-        """Stop what runs, and forget what waits."""
+        """Cancel what runs, and drop what waits."""
         self._waiting.clear()
         if self._parallel is not None:
             self._parallel.cancel()
@@ -277,7 +284,7 @@ class JobQueue(QObject):
         request, self._running = self._running, None
         if request is not None and request.is_idle_work:
             if isinstance(event, Cancelled) and self._waiting and self._idle_work is None:
-                self._idle_work = request  # it made way for work that was asked for
+                self._idle_work = request  # it was cancelled for requested work
             _end_idle_work(request, event)
         elif request is not None:
             self.ended.emit()
@@ -288,7 +295,7 @@ class JobQueue(QObject):
                     self.failed.emit(event.message, event.details)
                 case Cancelled():
                     self.cancelled.emit(request.title)
-        # What was done may have asked for more.
+        # What was done may have requested more.
         if self._running is None:
             self._next()
 

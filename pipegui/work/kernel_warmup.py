@@ -1,7 +1,7 @@
-"""Compiling the detection's kernels once, beside the window, before anybody asks for them.
+"""Compiling the detection's kernels once, in the background, before they are needed.
 
-numba keeps what it compiles on disk; a process of its own fills that store, so that the
-window stays free. It is done anew whenever the program or numba has changed.
+numba caches what it compiles on disk; a separate process fills that cache, so that the
+window stays responsive. It is repeated whenever the program or numba has changed.
 """
 
 import os
@@ -21,7 +21,7 @@ KEY = "kernels/compiled"
 
 
 def stamp() -> str:
-    """What the compiled kernels belong to: program, numba, and the kernels' own files."""
+    """Return what compiled kernels depend on: versions of program, numba, Python and kernels."""
     kernels = Path(pipecore.__file__).parent / "_kernels"
     newest = max((int(f.stat().st_mtime) for f in kernels.glob("*.py")), default=0)
     return f"{pipecore.__version__} {version('numba')} {newest} {sys.version_info[:2]}"
@@ -34,7 +34,7 @@ def detect_demo(folder: str) -> list[str]:
 
 
 class KernelWarmup(QObject):
-    """Runs the command once for each stamp."""
+    """Runs the command once for each `stamp`."""
 
     started = Signal()
     ended = Signal()
@@ -57,8 +57,13 @@ class KernelWarmup(QObject):
         self.started.emit()
         self._process.start(self._command[0], self._command[1:])
 
+    @property
+    def is_running(self) -> bool:
+        """Whether the command runs."""
+        return self._process.state() == QProcess.ProcessState.Running
+
     def close(self) -> None:
-        """Stop it; what is compiled already stays."""
+        """Stop the command; what is compiled already stays cached."""
         self._process.finished.disconnect(self._finish)
         if self._process.state() != QProcess.ProcessState.NotRunning:
             self._process.kill()
@@ -71,7 +76,7 @@ class KernelWarmup(QObject):
         self.ended.emit()
 
     def _lower_priority(self) -> None:
-        """Let everything else go first."""
+        """Give the process a low priority."""
         if hasattr(os, "setpriority"):
             with suppress(OSError):  # it has ended already
                 os.setpriority(os.PRIO_PROCESS, self._process.processId(), 10)

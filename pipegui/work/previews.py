@@ -1,7 +1,7 @@
-"""Looking at stacks and profiles before a detection runs.
+"""Previews of stacks and profiles before a detection runs.
 
-Keeps what is looked at, asks the worker for it when nothing else runs, and hands the
-answers on. Answers for another scan or other settings are dropped.
+Remembers what shall be shown, computes it when nothing else runs, and emits it. Values
+for another scan or other settings are dropped.
 """
 
 from collections.abc import Callable
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from pipecore.preview import Plan, ProfilePreview
     from pipegui.work.worker import JobProgress
 
-PATIENCE_MS = 250
-"""After a change, so that a number that is still being typed asks for nothing."""
+DELAY_MS = 250
+"""After a change, so that a number still being typed starts nothing."""
 
 
 @dataclass(frozen=True)
-class _Wish:
-    """What a plan stands on; clouds are compared by identity."""
+class _Inputs:
+    """What a plan is computed from; clouds are compared by identity."""
 
     cloud: PointCloud
     settings: Settings
 
-    def has_same_plan(self, other: "_Wish | None") -> bool:
+    def has_same_plan(self, other: "_Inputs | None") -> bool:
         """Whether the same stacks would be cut."""
         return (
             other is not None
@@ -42,7 +42,7 @@ class _Wish:
 
 
 class Previews(QObject):
-    """The plan of the active scan, and the profile of it that is looked at."""
+    """The plan of the active scan, and the profile of it that is shown."""
 
     planned = Signal(object)
     """A `PlanState`."""
@@ -52,101 +52,101 @@ class Previews(QObject):
     def __init__(self, jobs: JobQueue, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._jobs = jobs
-        self._wish: _Wish | None = None
-        self._planned_for: _Wish | None = None
+        self._inputs: _Inputs | None = None
+        self._planned_for: _Inputs | None = None
         self._plan: Plan | None = None
         self._row, self._index = 0, 0
-        self._is_list_seen, self._is_profile_seen = False, False
-        self._soon = QTimer(self)
-        self._soon.setSingleShot(True)
-        self._soon.setInterval(PATIENCE_MS)
-        self._soon.timeout.connect(self._ask)
+        self._is_list_visible, self._is_profile_visible = False, False
+        self._delay = QTimer(self)
+        self._delay.setSingleShot(True)
+        self._delay.setInterval(DELAY_MS)
+        self._delay.timeout.connect(self._compute)
 
-    def watch_list(self, is_seen: bool) -> None:
-        """Take note whether anybody sees the list of stacks: what nobody sees is not made."""
-        self._is_list_seen = is_seen
-        self._soon.start()
+    def set_list_visible(self, is_visible: bool) -> None:
+        """Say whether the list of stacks is visible: what is hidden is not computed."""
+        self._is_list_visible = is_visible
+        self._delay.start()
 
-    def watch_profile(self, is_seen: bool) -> None:
-        """Take note whether anybody sees the profile."""
-        self._is_profile_seen = is_seen
-        self._soon.start()
+    def set_profile_visible(self, is_visible: bool) -> None:
+        """Say whether the profile is visible."""
+        self._is_profile_visible = is_visible
+        self._delay.start()
 
     def apply(self, state: PlanningState) -> None:
-        """Look at the active scan with the present settings."""
-        cloud, settings, before = state.cloud, state.settings, self._wish
-        self._wish = _Wish(cloud, settings) if cloud is not None else None
-        if self._wish is None:
-            self._forget("")
-        elif not self._wish.has_same_plan(before):
-            self._forget(tr("Looking at the cloud …"))
+        """Plan the active scan with the present settings."""
+        cloud, settings, before = state.cloud, state.settings, self._inputs
+        self._inputs = _Inputs(cloud, settings) if cloud is not None else None
+        if self._inputs is None:
+            self._reset("")
+        elif not self._inputs.has_same_plan(before):
+            self._reset(tr("Looking at the cloud …"))
         elif before is not None and before.settings != settings:
-            self._soon.start()
+            self._delay.start()
 
     def choose(self, row: int, index: int | None = None) -> None:
-        """Look at a profile of the stack in a row of the plan; by default its fullest one."""
+        """Show a profile of the stack in a row of the plan; by default its fullest one."""
         if self._plan is None or not 0 <= row < len(self._plan.stacks):
             return
         planned = self._plan.stacks[row]
         wanted = planned.fullest if index is None else index
         self._row, self._index = row, min(max(wanted, planned.first), planned.last)
-        self._tell_profile(None)
-        self._soon.start()
+        self._emit_profile(None)
+        self._delay.start()
 
     def step(self, by: int) -> None:
-        """Look at the profile so many further."""
+        """Show the profile so many further."""
         self.choose(self._row, self._index + by)
 
-    def _forget(self, message: str) -> None:
+    def _reset(self, message: str) -> None:
         self._plan, self._planned_for, self._row = None, None, 0
         self.planned.emit(PlanState(message=message))
         self.previewed.emit(PreviewState(message=message))
-        self._soon.start()
+        self._delay.start()
 
-    def _ask(self) -> None:
-        wish = self._wish
-        if wish is None or not (self._is_list_seen or self._is_profile_seen):
+    def _compute(self) -> None:
+        inputs = self._inputs
+        if inputs is None or not (self._is_list_visible or self._is_profile_visible):
             return
-        if not wish.has_same_plan(self._planned_for):
+        if not inputs.has_same_plan(self._planned_for):
             plan = self._jobs.plan
-            self._look(
-                lambda progress: plan(wish.cloud, wish.settings, progress),
-                lambda value: self._take_plan(wish, value),
+            self._run(
+                lambda progress: plan(inputs.cloud, inputs.settings, progress),
+                lambda value: self._on_planned(inputs, value),
             )
-        elif self._is_profile_seen and self._plan is not None:
-            self._ask_for_profile(wish, self._plan)
+        elif self._is_profile_visible and self._plan is not None:
+            self._compute_profile(inputs, self._plan)
 
-    def _ask_for_profile(self, wish: _Wish, plan: "Plan") -> None:
+    def _compute_profile(self, inputs: _Inputs, plan: "Plan") -> None:
         stack, index = plan.stacks[self._row].stack, self._index
 
         def work(progress: "JobProgress") -> "ProfilePreview":
             from pipecore.preview import preview_profile  # noqa: PLC0415
 
-            return preview_profile(wish.cloud, wish.settings, plan, stack, index, progress)
+            return preview_profile(inputs.cloud, inputs.settings, plan, stack, index, progress)
 
         def done(preview: "ProfilePreview") -> None:
-            is_wanted = wish == self._wish and plan is self._plan and index == self._index
+            is_wanted = inputs == self._inputs and plan is self._plan and index == self._index
             if is_wanted and stack is plan.stacks[self._row].stack:
-                self._tell_profile(preview)
+                self._emit_profile(preview)
 
-        self._look(work, done)
+        self._run(work, done)
 
-    def _look(self, work: Callable[..., object], done: Callable[..., None]) -> None:
-        self._jobs.run_when_idle(work, done, self._fail)
+    def _run(self, work: Callable[..., object], done: Callable[..., None]) -> None:
+        self._jobs.run_when_idle(work, done, self._on_failed)
 
-    def _fail(self, message: str) -> None:
-        self._planned_for = self._wish  # asked again only once something changes
+    def _on_failed(self, message: str) -> None:
+        self._planned_for = self._inputs  # computed again only once something changes
         self._plan = None
         self.planned.emit(PlanState(message=message))
         self.previewed.emit(PreviewState(message=message))
 
-    def _take_plan(self, wish: _Wish, plan: "Plan | None") -> None:
-        if not wish.has_same_plan(self._wish):
+    def _on_planned(self, inputs: _Inputs, plan: "Plan | None") -> None:
+        if not inputs.has_same_plan(self._inputs):
             return
-        self._plan, self._planned_for = plan, wish
+        self._plan, self._planned_for = plan, inputs
         self.planned.emit(PlanState(plan))
         if plan is not None and plan.stacks:
             self.choose(min(self._row, len(plan.stacks) - 1))
 
-    def _tell_profile(self, preview: "ProfilePreview | None") -> None:
+    def _emit_profile(self, preview: "ProfilePreview | None") -> None:
         self.previewed.emit(PreviewState(self._plan, self._row, self._index, preview))

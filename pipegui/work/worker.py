@@ -1,8 +1,8 @@
 """Long work in a thread of its own: one job at a time, reported as typed events.
 
 Each job ends in exactly one of `Finished`, `Failed` and `Cancelled`. Starting a job
-cancels the one that runs. A cancelled job ends at its next sign of progress, and for the
-user in half a second at the latest: what it still says after its end is dropped.
+cancels the one that runs. A cancelled job ends at its next update of progress, and for the
+user in half a second at the latest: what it still reports after its end is dropped.
 """
 
 import queue
@@ -37,12 +37,12 @@ class Progressed:
     stage: str
     fraction: float
     seconds_left: float | None
-    """Once it has run long enough to tell."""
+    """None until it has run long enough for an estimate."""
 
 
 @dataclass(frozen=True, eq=False)
 class PartReady:
-    """A part of what a job makes can be shown already."""
+    """A part of a job's value can be shown already."""
 
     job: int
     part: Any
@@ -50,7 +50,7 @@ class PartReady:
 
 @dataclass(frozen=True)
 class Finished:
-    """A job has made its value."""
+    """A job has ended with its value."""
 
     job: int
     value: Any
@@ -58,7 +58,7 @@ class Finished:
 
 @dataclass(frozen=True)
 class Failed:
-    """A job could not do what it should; `details` are for a bug report."""
+    """A job has ended with an error; `details` are for a bug report."""
 
     job: int
     message: str
@@ -75,12 +75,12 @@ class Cancelled:
 Event = Started | Progressed | PartReady | Finished | Failed | Cancelled
 
 EVENTS_PER_SECOND = 15
-PATIENCE_MS = 450
-"""How long a cancelled job may take to notice before the user hears that it has ended."""
+CANCEL_TIMEOUT_MS = 450
+"""How long a cancelled job may take to notice before it is reported as ended all the same."""
 
 
 class JobProgress:
-    """The progress that a job reports to: emits at a calm pace, raises once cancelled."""
+    """The progress of a job: emits at most `EVENTS_PER_SECOND`, raises once cancelled."""
 
     def __init__(self, job: int, emit: Callable[[Event], None]) -> None:
         self.is_cancelled = threading.Event()
@@ -90,11 +90,11 @@ class JobProgress:
         self._shares: Mapping[str, float] = {}
 
     def expect(self, shares: Mapping[str, float]) -> None:
-        """Take note of the stages to come, in their order, with their shares of the time."""
+        """Set the stages to come, in their order, with their shares of the time."""
         self._shares, self._since = shares, time.monotonic()
 
     def update(self, stage: str, fraction: float) -> None:
-        """Tell how far a stage is."""
+        """Report that a stage is done to a fraction (0 to 1)."""
         if self.is_cancelled.is_set():
             raise CancelledError
         now = time.monotonic()
@@ -112,12 +112,12 @@ class JobProgress:
         self._emit(Progressed(self._job, stage, done, left))
 
     def show_part(self, part: Any) -> None:
-        """Show a part of what the job makes."""
+        """Emit a part of the job's value that can be shown already."""
         if not self.is_cancelled.is_set():
             self._emit(PartReady(self._job, part))
 
     def _of_all(self, stage: str, fraction: float) -> float:
-        """How much of the whole work is done; of the stage where no more is known."""
+        """Return the fraction done of all stages; of this one where it was not expected."""
         if stage not in self._shares:
             return fraction
         stages = list(self._shares)
@@ -166,11 +166,11 @@ class Worker(QObject):
         return job
 
     def cancel(self) -> None:
-        """Ask the job that runs to stop, at its next sign of progress."""
+        """Cancel the job that runs, at its next update of progress."""
         if self._progress is not None and not self._progress.is_cancelled.is_set():
             self._progress.is_cancelled.set()
             late = Cancelled(self._current)
-            QTimer.singleShot(PATIENCE_MS, self, lambda: self._deliver(late))
+            QTimer.singleShot(CANCEL_TIMEOUT_MS, self, lambda: self._deliver(late))
 
     def close(self, timeout_s: float = 5.0) -> bool:
         """Cancel, and wait for the thread to end; returns whether it did."""
@@ -184,7 +184,7 @@ class Worker(QObject):
         while (item := self._jobs.get()) is not None:
             progress, job, work = item
             ended = _end_of(progress, job, work)
-            # Who closed does not wait for ever: nobody may be there to hear of the end.
+            # After a timeout of `close` the receiver may be gone.
             with suppress(RuntimeError):
                 self._posted.emit(ended)
 
@@ -202,12 +202,12 @@ class Worker(QObject):
         self._unended.remove(event.job)
         if is_current:
             self._current, self._progress = 0, None
-        # A value that comes after the cancel was asked for is not wanted any more.
+        # A value that comes after the cancel is dropped.
         self.happened.emit(event if is_wanted else Cancelled(event.job))
 
 
 def _end_of(progress: JobProgress, job: int, work: Work) -> Event:
-    """Do the work; whatever happens becomes the one event that ends it."""
+    """Do the work, and return the one event that ends it, whatever happens."""
     try:
         progress.update("", 0.0)
         return Finished(job, work(progress))

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from PySide6.QtGui import QImage
 
+from pipecore.errors import ReadError
 from pipegui import app
-from pipegui.work import job_queue as jobs
+from pipegui.work.job_queue import JobQueue
 from tests.factories import make_cloud, make_result
 from tests.gui.fakes import make_fake_views
 
@@ -17,13 +18,13 @@ from tests.gui.fakes import make_fake_views
 def faked(qapp, monkeypatch):
     """The app over fakes, as `main` finds them."""
     monkeypatch.setattr("pipegui.window.views.make_views", make_fake_views)
-    monkeypatch.setattr(jobs.JobQueue.__init__, "__defaults__", (_read, _detect, _plan, None))
+    monkeypatch.setattr(JobQueue.__init__, "__defaults__", (_read, _detect, _plan, None))
 
 
 def _read(path, settings, progress):
     progress.update("reading", 0.5)
     if not path.is_file():
-        raise jobs.ReadError(f"There is no file “{path}”.")
+        raise ReadError(f"There is no file “{path}”.")
     return make_cloud()
 
 

@@ -10,9 +10,9 @@ from pipecore.geometry import LineAxis
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, Review, ReviewState, Verdict
 from pipegui.model import commands
-from pipegui.model import selection as selecting
 from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
 from pipegui.model.history import History
+from pipegui.model.selection import nearest_profile, selection_of_deformation, worst_deformation
 from tests.factories import make_scan
 
 CLOUD, RESULT = make_scan()
@@ -88,7 +88,7 @@ def test_that_a_selection_is_let_go_when_its_element_is_no_longer_found():
         deformations=tuple(d for d in RESULT.deformations if d.element_id < 9),
     )
     again = commands.set_result(document, CLOUD, fewer)
-    assert again.selection == selecting.of_deformation(fewer, selecting.worst_deformation(fewer))
+    assert again.selection == selection_of_deformation(fewer, worst_deformation(fewer))
 
 
 def test_that_escape_goes_up_to_nothing():
@@ -120,7 +120,7 @@ def test_that_a_spot_on_the_map_selects_the_dent_there_or_the_profile_beside_it(
     assert inside.selection.deformation_id == 1
     opposite = commands.select_spot(document, dent.chainage, dent.clock + np.pi)
     assert opposite.selection.deformation_id == 0
-    assert opposite.selection.profile == selecting.nearest_profile(RESULT, 2, dent.chainage)
+    assert opposite.selection.profile == nearest_profile(RESULT, 2, dent.chainage)
 
 
 def test_that_stepping_through_profiles_stops_at_the_ends():

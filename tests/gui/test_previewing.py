@@ -86,12 +86,11 @@ def test_that_idle_work_makes_way_for_work_and_comes_back_after_it(jobs, qtbot):
 
 def test_that_newer_idle_work_replaces_what_waits(jobs, qtbot):
     told, release = [], threading.Event()
-    jobs._detect = lambda *_: release.wait(PATIENCE_S)
-    jobs.detect(CLOUD, Settings())
+    jobs.run("Waiting", lambda _: release.wait(PATIENCE_S), told.append)
     jobs.run_when_idle(lambda _: "old", told.append, told.append)
     jobs.run_when_idle(lambda _: "new", told.append, told.append)
     release.set()
-    qtbot.waitUntil(lambda: told == ["new"])
+    qtbot.waitUntil(lambda: told == [True, "new"])
 
 
 def test_that_idle_work_that_fails_says_why(jobs, qtbot):
@@ -130,7 +129,7 @@ def test_that_nothing_is_planned_while_nobody_looks(jobs, qtbot):
     seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.wait(500)
     assert seen.plan is None
-    seen.previews.watch_list(True)
+    seen.previews.set_list_visible(True)
     qtbot.waitUntil(lambda: seen.plan is not None)
     assert [s.stack.name for s in seen.plan.stacks][:3] == ["X", "Y", "Z"]
     assert seen.profile is None  # nobody looks at the profile
@@ -138,7 +137,7 @@ def test_that_nothing_is_planned_while_nobody_looks(jobs, qtbot):
 
 def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
     seen = Seen(jobs)
-    seen.previews.watch_profile(True)
+    seen.previews.set_profile_visible(True)
     seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.waitUntil(lambda: seen.profile is not None)
     first = seen.profile
@@ -160,7 +159,7 @@ def test_that_the_profile_follows_stack_index_and_settings(jobs, qtbot):
 
 def test_that_steps_end_at_the_ends(jobs, qtbot):
     seen = Seen(jobs)
-    seen.previews.watch_profile(True)
+    seen.previews.set_profile_visible(True)
     seen.previews.apply(PlanningState(CLOUD, AXES))
     qtbot.waitUntil(lambda: seen.profile is not None)
     seen.previews.step(10**6)
@@ -171,7 +170,7 @@ def test_that_steps_end_at_the_ends(jobs, qtbot):
 
 def test_that_a_closed_scan_is_forgotten(jobs, qtbot):
     seen = Seen(jobs)
-    seen.previews.watch_list(True)
+    seen.previews.set_list_visible(True)
     seen.previews.apply(PlanningState(CLOUD, AXES))
     seen.previews.apply(PlanningState(None, AXES))
     qtbot.wait(600)

@@ -50,9 +50,9 @@ def test_that_a_warming_that_failed_is_tried_again(qtbot, stored, tmp_path):
 def test_that_closing_the_window_ends_it(qtbot, stored):
     warming = KernelWarmup(stored, [sys.executable, "-c", "import time; time.sleep(600)"])
     warming.start()
-    qtbot.waitUntil(lambda: warming._process.processId() > 0)
+    qtbot.waitUntil(lambda: warming.is_running)
     warming.close()
-    assert warming._process.processId() == 0
+    assert not warming.is_running
     assert not stored.allKeys()
 
 

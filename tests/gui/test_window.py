@@ -13,6 +13,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
 from pipegui.model.document import Background, ColourBy, ProfileKey, Selection, Tool
+from pipegui.model.selection import selection_of_deformation
 from pipegui.panels.deformation_columns import INDEX
 from pipegui.states.view_state import resolve
 from pipegui.window.action_table import SPECS
@@ -130,11 +131,8 @@ def test_that_a_choice_anywhere_is_shown_everywhere(detected, qtbot, by):
         parts.map.deformation_clicked.emit(4)
     elif by == "tree":
         tree = app.window.panels.tree
-        index = next(
-            tree.model.createIndex(n.row, 0, n.number)
-            for n in tree.model.nodes
-            if n.text == "Dent 4 · Pipe 9"
-        )
+        index = tree.model.index_of(0, selection_of_deformation(make_result(), 4))
+        assert index.data() == "Dent 4 · Pipe 9"
         tree.view.scrollTo(index)
         rect = tree.view.visualRect(index)
         qtbot.mouseClick(tree.view.viewport(), LEFT, pos=rect.center())
@@ -388,16 +386,18 @@ def test_that_a_file_that_cannot_be_read_is_told_with_details_to_copy(make_app, 
     dialog.close()
 
 
-def test_that_a_bug_in_the_detection_keeps_scan_and_result(detected, qtbot):
-    def broken(cloud, settings, progress):
-        raise IndexError("bins")
-
-    detected.session.jobs._detect = broken
-    result = detected.session.document.result
-    detected.controllers.scans.detect()
+def test_that_a_bug_in_the_detection_keeps_scan_and_result(make_app, qtbot):
+    results = [make_result()]
+    app = make_app(detect=lambda *_: results.pop())  # the second time raises `IndexError`
+    app.controllers.scans.open_files([Path("plant.laz")])
+    qtbot.waitUntil(app.window.actions_["detect"].isEnabled)
+    app.controllers.scans.detect()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    result = app.session.document.result
+    app.controllers.scans.detect()
     told = "Your scans and earlier results are safe."
-    qtbot.waitUntil(lambda: told in detected.window.panels.message.text.text())
-    assert detected.session.document.result is result
+    qtbot.waitUntil(lambda: told in app.window.panels.message.text.text())
+    assert app.session.document.result is result
 
 
 def test_that_requests_wait_for_each_other(make_app, qtbot):
