@@ -62,7 +62,26 @@ def ask_settings(parent: QWidget, settings: QSettings) -> Path | None:
 def ask_target(
     parent: QWidget, settings: QSettings, title: str, name: str, name_filter: str
 ) -> Path | None:
-    """Ask where to write a file; `name` is proposed, with its ending."""
+    """Ask where to write a file; `name` is proposed, with its ending.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The dialog opens over it.
+    settings : QSettings
+        Remembers the folder used last.
+    title : str
+        Of the dialog.
+    name : str
+        The file's proposed name.
+    name_filter : str
+        Kinds of files, as Qt writes them: "Tables (*.csv)".
+
+    Returns
+    -------
+    Path or None
+        None if the user cancels.
+    """
     proposed = Path(_last_folder(settings)) / name
     chosen, _ = QFileDialog.getSaveFileName(parent, title, str(proposed), name_filter)
     if not chosen:
@@ -80,7 +99,17 @@ def save_as(
     name_filter: str,
     write: Callable[[Path], None],
 ) -> None:
-    """Ask where to write a file as `ask_target` does, write it, and say what came of it."""
+    """Ask where to write a file as `ask_target` does, write it, and say what came of it.
+
+    Parameters
+    ----------
+    session : Session
+        Shows what came of it.
+    parent, title, name, name_filter
+        As for `ask_target`.
+    write : callable
+        Writes the file at a path.
+    """
     path = ask_target(parent, session.stored, title, name, name_filter)
     if path is None:
         return

@@ -28,7 +28,15 @@ class HasPreferences(Protocol):
 
 
 def remember_choices(stored: QSettings, views: Mapping[str, HasPreferences]) -> None:
-    """Give each view its stored choices, and store those to come under its name."""
+    """Give each view its stored choices, and store those to come under its name.
+
+    Parameters
+    ----------
+    stored : QSettings
+        Where choices are stored.
+    views : mapping
+        Views by the names under which their choices are stored.
+    """
     for name, view in views.items():
         key = f"choices/{name}"
         choices: Any = None

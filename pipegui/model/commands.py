@@ -231,7 +231,21 @@ def select_profile(document: Document, stack_id: int, profile_index: int) -> Doc
 
 
 def select_spot(document: Document, chainage: float, clock: float) -> Document:
-    """Select what is at a spot of the selected element's surface."""
+    """Select what is at a spot of the selected element's surface.
+
+    Parameters
+    ----------
+    document : Document
+        The present document.
+    chainage : float
+        Along the element's axis, metres.
+    clock : float
+        Angle around the axis, radians.
+
+    Returns
+    -------
+    Document
+    """
     if document.result is None or not document.selection.element_id:
         return document
     spot = selection_at_spot(document.result, document.selection.element_id, chainage, clock)

@@ -52,7 +52,21 @@ def profiles_of(result: Result, element_id: int) -> Profiles:
 
 @cached_with_owner(maxsize=32)
 def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | None:
-    """Return one profile as a table of one row, None if it is not there."""
+    """Return one profile as a table of one row, None if it is not there.
+
+    Parameters
+    ----------
+    result : Result
+        The result to look in.
+    element_id : int
+        The profile's element.
+    key : ProfileKey
+        Stack and index of the profile.
+
+    Returns
+    -------
+    Profiles or None
+    """
     rows = profiles_of(result, element_id)
     row = (rows.stack_id == key.stack_id) & (rows.profile_index == key.profile_index)
     return rows[np.flatnonzero(row)[:1]] if row.any() else None
@@ -60,7 +74,20 @@ def profile_at(result: Result, element_id: int, key: ProfileKey) -> Profiles | N
 
 @cached_with_owner(maxsize=32)
 def stack_choices(result: Result, element_id: int) -> tuple[tuple[int, str, int], ...]:
-    """Return stacks with profiles of an element: the normal stack first, then by number."""
+    """Return stacks with profiles of an element: the normal stack first, then by number.
+
+    Parameters
+    ----------
+    result : Result
+        The result to look in.
+    element_id : int
+        The element.
+
+    Returns
+    -------
+    tuple of (int, str, int)
+        Id and name of each stack, and its number of profiles of the element.
+    """
     ids, counts = np.unique(profiles_of(result, element_id).stack_id, return_counts=True)
     choices = [
         (int(i), stack_name(result, int(i)), int(n)) for i, n in zip(ids, counts, strict=True)
@@ -104,7 +131,22 @@ def stack_name(result: Result, stack_id: int) -> str:
 
 @cached_with_owner(maxsize=4)
 def points_of(result: Result, cloud: PointCloud, element_id: int) -> ElementPoints:
-    """Return the points of one element in its pipe coordinates."""
+    """Return the points of one element in its pipe coordinates.
+
+    Parameters
+    ----------
+    result : Result
+        A result of `cloud`.
+    cloud : PointCloud
+        All points.
+    element_id : int
+        The element.
+
+    Returns
+    -------
+    ElementPoints
+        Chainage and distance from the axis in metres, clock angle in radians.
+    """
     return element_points(cloud, result, element_id)
 
 
@@ -118,7 +160,24 @@ def points_of_profile(result: Result, cloud: PointCloud, element_id: int, key: P
 
 
 def spot_on_surface(result: Result, element_id: int, chainage: float, clock: float) -> Array:
-    """Local coordinates of a spot of an element's undeformed surface, shape (3,)."""
+    """Local coordinates of a spot of an element's undeformed surface, shape (3,).
+
+    Parameters
+    ----------
+    result : Result
+        The result to look in.
+    element_id : int
+        The element.
+    chainage : float
+        Along the element's axis, metres.
+    clock : float
+        Angle around the axis, radians.
+
+    Returns
+    -------
+    ndarray
+        Local coordinates in metres, shape (3,).
+    """
     element = result.element(element_id)
     radius = float(element.radius_at(chainage))
     return np.asarray(surface_points(element.axis, [chainage], [radius], [clock])[0])
@@ -127,7 +186,24 @@ def spot_on_surface(result: Result, element_id: int, chainage: float, clock: flo
 def spot_of_point(
     cloud: PointCloud, result: Result, element_id: int, point_index: int
 ) -> tuple[float, float] | None:
-    """Chainage and clock of a point of the cloud on an element, None if it is not on it."""
+    """Chainage and clock of a point of the cloud on an element, None if it is not on it.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        All points.
+    result : Result
+        A result of `cloud`.
+    element_id : int
+        The element.
+    point_index : int
+        Which point of the cloud, -1 for none.
+
+    Returns
+    -------
+    (float, float) or None
+        Chainage in metres and clock angle in radians.
+    """
     if not element_id or point_index < 0 or int(result.element_id[point_index]) != element_id:
         return None
     xyz = cloud.xyz[point_index : point_index + 1].astype(np.float64)

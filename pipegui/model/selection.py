@@ -30,7 +30,23 @@ def selection_of_deformation(result: Result, deformation_id: int) -> Selection:
 
 
 def selection_at_spot(result: Result, element_id: int, chainage: float, clock: float) -> Selection:
-    """Select what is at a spot of an element's surface: a deformation, else the profile there."""
+    """Select what is at a spot of an element's surface: a deformation, else the profile there.
+
+    Parameters
+    ----------
+    result : Result
+        The result to select in.
+    element_id : int
+        The element.
+    chainage : float
+        Along the element's axis, metres.
+    clock : float
+        Angle around the axis, radians.
+
+    Returns
+    -------
+    Selection
+    """
     element = result.element(element_id)
     radius = float(element.radius_at(chainage))
     for deformation in result.deformations_of(element_id):
@@ -76,7 +92,21 @@ def worst_deformation(result: Result) -> int:
 
 
 def carry_over_selection(selection: Selection, old: Result | None, new: Result | None) -> Selection:
-    """Return the same selection in another result of the same cloud, as far as it is there."""
+    """Return the same selection in another result of the same cloud, as far as it is there.
+
+    Parameters
+    ----------
+    selection : Selection
+        What is selected in `old`.
+    old, new : Result or None
+        Two results of one cloud.
+
+    Returns
+    -------
+    Selection
+        Of the element about the same axis with about the same radius, the deformation of the
+        same kind whose peak is nearest, and the profile nearest to the same place.
+    """
     if old is new:
         return selection
     if old is None or new is None:
@@ -113,7 +143,20 @@ def _same_run(run_id: int, old: Result, new: Result) -> int:
 def carry_over_reviews(
     reviews: Mapping[int, Review], old: Result | None, new: Result
 ) -> Mapping[int, Review]:
-    """Return what was said of deformations for those that are found again."""
+    """Return what was said of deformations for those that are found again.
+
+    Parameters
+    ----------
+    reviews : mapping
+        Reviews of deformations of `old`, by their ids.
+    old, new : Result
+        Two results of one cloud; `old` may be None.
+
+    Returns
+    -------
+    mapping
+        The reviews by the ids of `new`.
+    """
     if old is None or old is new:
         return reviews
     kept: dict[int, Review] = {}

@@ -25,7 +25,19 @@ def set_point_size(document: Document, size: str) -> Document:
 
 
 def set_limits(document: Document, limits: Limits) -> Document:
-    """Choose the ends of the colours: heights in the world's metres, or intensities."""
+    """Choose the ends of the colours: heights in the world's metres, or intensities.
+
+    Parameters
+    ----------
+    document : Document
+        The present document.
+    limits : (float, float)
+        World heights in metres, or intensities, in any order.
+
+    Returns
+    -------
+    Document
+    """
     low, high = min(limits), max(limits)
     if document.scan is None or low == high:
         return document
@@ -65,7 +77,19 @@ def choose_tool(document: Document, tool: Tool) -> Document:
 
 
 def click_point(document: Document, point_index: int) -> Document:
-    """Use the chosen tool on a point of the cloud; -1 is a click beside all points."""
+    """Use the chosen tool on a point of the cloud; -1 is a click beside all points.
+
+    Parameters
+    ----------
+    document : Document
+        The present document.
+    point_index : int
+        Which point of the active scan's cloud.
+
+    Returns
+    -------
+    Document
+    """
     view = document.view
     if view.tool is Tool.SELECT:
         return select_point(document, point_index)
@@ -191,7 +215,18 @@ def set_clip_box(document: Document, box: Box) -> Document:
 
 @cached_with_owner(maxsize=2)
 def extent(cloud: PointCloud) -> tuple[Array, Array]:
-    """Least and greatest local coordinates of a cloud."""
+    """Least and greatest local coordinates of a cloud.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        At least one point.
+
+    Returns
+    -------
+    low, high : ndarray
+        Local coordinates in metres, float64, shape (3,).
+    """
     columns = cloud.xyz.T
     low = np.array([c.min() for c in columns], np.float64)
     return low, np.array([c.max() for c in columns], np.float64)

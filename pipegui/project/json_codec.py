@@ -30,7 +30,17 @@ VERSION_1_NAMES = {"LineAxis": "line", "ArcAxis": "arc"}
 
 
 def to_plain(value: Any) -> Any:  # noqa: PLR0911 - one for each type
-    """Turn a value into dicts, lists, strings and numbers; nan becomes None."""
+    """Turn a value into dicts, lists, strings and numbers; nan becomes None.
+
+    Parameters
+    ----------
+    value : dataclass, array, enum, path, settings, or a container of such
+        What is to be written.
+
+    Returns
+    -------
+    dict, list, str, int, float, bool or None
+    """
     if isinstance(value, Settings):
         return value.to_dict()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -64,6 +74,18 @@ def _number(value: float) -> float | str | None:
 
 def from_plain(kind: Any, plain: Any) -> Any:  # noqa: PLR0911 - one for each type
     """Turn plain values into a value of a type.
+
+    Parameters
+    ----------
+    kind : type
+        The type wanted, which may be a union or generic.
+    plain : dict, list, str, int, float, bool or None
+        What was read.
+
+    Returns
+    -------
+    object
+        A value of that type.
 
     Raises
     ------

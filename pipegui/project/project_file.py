@@ -145,6 +145,19 @@ def write_project(
 ) -> None:
     """Write a project: the whole file or nothing.
 
+    Parameters
+    ----------
+    path : Path
+        The file; one that is there is replaced.
+    document : Document
+        What is written.
+    camera : mapping, optional
+        Where the 3D view looks from.
+    recovered_from : Path, optional
+        The project that an autosaved copy is made of.
+    progress : Progress, optional
+        Reports how much is written.
+
     Raises
     ------
     WriteError
@@ -218,6 +231,17 @@ def _arrays(document: Document) -> Iterator[tuple[str, NDArray[Any]]]:
 
 def read_project(path: Path, progress: Progress | None = None) -> SavedProject:
     """Read a project file, without its clouds.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    progress : Progress, optional
+        Reports how much is read.
+
+    Returns
+    -------
+    SavedProject
 
     Raises
     ------
