@@ -1,6 +1,7 @@
 """The families of scenes: what stands in them, how they are looked at, with which noise."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -93,9 +94,10 @@ def lone(rng: Rng) -> WorldScene:
     drawn = pipes.FEATURES[feature][0](assembly, rng, radius, direction)
     reach = max(e.axis.length for e in assembly.elements) / 2
     view_name, view = _lone_view(rng, radius, direction, reach)
+    view = replace(view, spacing=min(view.spacing, drawn.pop("most_spacing", np.inf)))
     noise_name, noise = draw_noise(rng, radius, view.spacing)
     if noise_name == "duplicates":
-        view = View(view.stations, view.pattern, max(view.spacing, 0.02 * radius), view.along)
+        view = replace(view, spacing=max(view.spacing, 0.02 * radius))
     properties = {
         "feature": feature, "radius": radius, "view": view_name, "pattern": str(view.pattern),
         "fault": noise_name, **drawn,

@@ -145,7 +145,9 @@ def _element_row(
             abs(error) <= max(RADIUS_RATIO * true.radius, RADIUS_SDS * sd)
         )
     claimed = drawn.chainage[rows[ids == main.element_id]]
-    row["is_whole"] = row["is_found"] and row["n_pieces"] == 1 and _spans(claimed, drawn, rows)
+    # Poles of a sphere may be covered by what it is joined to.
+    reaches = true.kind is ElementKind.SPHERE or _spans(claimed, drawn, rows)
+    row["is_whole"] = row["is_found"] and row["n_pieces"] == 1 and reaches
     ovality = _true_ovality(drawn, true)
     if ovality is not None and main.kind is true.kind:
         row |= _ovality_row(ovality, main, row["arc"])

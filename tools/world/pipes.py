@@ -17,8 +17,8 @@ from tools.world.shapes import (
     Steps,
     Waves,
 )
-from tools.world.surfaces import Array, across
-from tools.world.tubes import Arc, Line
+from tools.world.surfaces import Array, Patch, across
+from tools.world.tubes import Arc, Line, tube
 
 Rng = np.random.Generator
 MIN_RADIUS, MAX_PIPE_RADIUS, MAX_RADIUS = 0.0168, 0.457, 3.0
@@ -107,6 +107,7 @@ def _straight(
 
 
 Drawn = dict[str, Any]
+"""What was drawn; "most_spacing" (metres) is the widest that still shows it."""
 Feature = Callable[[Assembly, Rng, float, Array], Drawn]
 
 
@@ -170,11 +171,24 @@ def damaged(assembly: Assembly, rng: Rng, radius: float, direction: Array) -> Dr
     return {"damage": name}
 
 
+def walled(assembly: Assembly, rng: Rng, radius: float, direction: Array) -> Drawn:
+    """Draw a round pipe whose inner surface is seen too, as in open or photographed pipes."""
+    _straight(assembly, rng, radius, direction, [], "walled")
+    wall = max(rng.uniform(0.03, 0.1) * radius, 0.003)
+    outer = assembly.patches[0]
+    axis = assembly.elements[0].axis
+    inner = tube(
+        Line(axis.start, axis.tangent(0.0), axis.length), lambda s, theta: radius - wall + 0 * s
+    )
+    assembly.patches.append(Patch(inner, outer.body))
+    return {"wall": wall}
+
+
 def spool(assembly: Assembly, rng: Rng, radius: float, direction: Array) -> Drawn:
     """Draw a short piece of pipe."""
     length = max(rng.uniform(0.3, 3.0) * radius, SHORTEST)
     _straight(assembly, rng, radius, direction, [], "spool", length)
-    return {"length_radii": length / radius}
+    return {"length_radii": length / radius, "most_spacing": length / 6}
 
 
 def cone(assembly: Assembly, rng: Rng, radius: float, direction: Array) -> Drawn:
@@ -234,6 +248,7 @@ FEATURES: dict[str, tuple[Feature, float]] = {
     "dented": (dented, 3.0),
     "bow": (bow, 2.0),
     "damaged": (damaged, 1.5),
+    "walled": (walled, 0.7),
     "spool": (spool, 1.0),
     "cone": (cone, 1.0),
     "sphere": (sphere, 1.0),
@@ -242,4 +257,3 @@ FEATURES: dict[str, tuple[Feature, float]] = {
     "coil": (coil, 0.5),
 }
 """What a lone body may be, and how often it is drawn against the others."""
-STRAIGHT = ("plain", "oval", "rough", "dented", "bow", "damaged", "capped")

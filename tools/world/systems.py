@@ -21,6 +21,7 @@ FITTINGS = {
     "mitre": 0.5,
     "return bend": 0.7,
     "back to back": 0.7,
+    "capped stub": 0.7,
 }
 
 
@@ -52,6 +53,8 @@ def _line(run: Run, rng: Rng, reach: float) -> list[str]:
             name = "bend"
         if name == "tee":
             _branch(run, last, rng)
+        elif name == "capped stub":
+            _stub(run, last, rng)
         else:
             _fitting(run, name, rng, reach)
             last = _straight(run, rng)
@@ -161,6 +164,21 @@ def _between(start: Array, before: Array, end: Array, after: Array | None, ahead
         return ((points - start) @ before > 0) & ((points - end) @ after < 0)
 
     return keep
+
+
+def _stub(run: Run, header_id: int, rng: Rng) -> None:
+    """A capped pipe that ends just before the side of the last straight: no branch."""
+    header = run.assembly.elements[header_id - 1]
+    radius = header.radius * rng.uniform(0.4, 0.9)
+    if radius < 0.017:
+        return
+    outward = header.axis.frame(0.0)[1]
+    gap = rng.uniform(0.006, 0.17)
+    length = max(radius * rng.uniform(5, 10), 0.2)
+    foot = header.axis.at(header.axis.length / 2) + (header.radius + gap + radius / 2) * outward
+    stub = Run(run.assembly, "capped stub", foot + length * outward, -outward, radius)
+    stub.straight(length)
+    stub.cap(radius / 2)
 
 
 def _branch(run: Run, header_id: int, rng: Rng) -> None:
