@@ -81,7 +81,7 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
     with timer("surface"):
         surface = workspace.sample_surface(settings.thinning, progress)
     with timer("stacks"):
-        stacks = choose_stacks(surface, settings.stacks, progress, workspace.local_axes)
+        stacks = choose_stacks(surface, settings.stacks, settings.elements.max_radius, progress)
         overlay, fits = StackOverlay(len(surface.xyz), workspace.allocate), []
         max_radius = settings.elements.max_radius
         for first, plane in workspace.remove_planes(surface, max_radius, progress):

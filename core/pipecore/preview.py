@@ -164,7 +164,7 @@ def plan_stacks(
     if len(cloud) == 0:
         return None
     surface, is_whole = _surface_of_sample(cloud, settings, progress)
-    stacks = choose_stacks(surface, settings.stacks, progress)
+    stacks = choose_stacks(surface, settings.stacks, settings.elements.max_radius, progress)
     known = ~np.isnan(surface.normals[:, 0]) & is_whole
     xyz, normals, spacing = surface.xyz[known], surface.normals[known], surface.spacing[known]
     plans, is_cut = [], np.zeros(len(xyz), np.bool_)

@@ -18,7 +18,6 @@ from pipecore.parallel import for_chunks
 from pipecore.profiles import Curves, cut_portions
 from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
-from pipecore.stacks.directions import local_axes
 from pipecore.surface import Order, Surface, planes_of_points, sample_surface
 from pipecore.types import PointCloud, Stack
 
@@ -94,10 +93,6 @@ class Workspace(Protocol):
         """Downsample the cloud and estimate the normals of the downsampled points."""
         ...
 
-    def local_axes(self, surface: Surface, progress: Progress) -> Array:
-        """Directions of the local axis at sampled curved places of the surface, shape (k, 3)."""
-        ...
-
     def remove_planes(
         self, surface: Surface, max_radius: float, progress: Progress
     ) -> Iterator[PlaneLabels]:
@@ -148,10 +143,6 @@ class InMemory:
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
         """See `Workspace`."""
         return sample_surface(self.cloud, settings, progress)
-
-    def local_axes(self, surface: Surface, progress: Progress) -> Array:
-        """See `Workspace`."""
-        return local_axes(surface, progress)
 
     def remove_planes(
         self, surface: Surface, max_radius: float, progress: Progress

@@ -37,7 +37,7 @@ CLOUD = make_cloud()
 def test_that_the_plan_of_a_small_cloud_is_what_is_cut():
     plan = plan_stacks(CLOUD, AXES)
     surface = sample_surface(CLOUD, AXES.thinning, NoProgress())
-    stacks = choose_stacks(surface, AXES.stacks, NoProgress())
+    stacks = choose_stacks(surface, AXES.stacks, 5.0, NoProgress())
     assert [p.stack.name for p in plan.stacks] == [s.name for s in stacks]
     known = surface.normals[~np.isnan(surface.normals[:, 0])]
     for planned, stack in zip(plan.stacks, stacks, strict=True):

@@ -7,8 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from pipecore._kernels.eigen import eigenvalues, eigenvector, least_eigenpair
-from pipecore._kernels.voxel_hash import EMPTY, HashTable, slot_of
+from pipecore._kernels.eigen import least_eigenpair
+from pipecore._kernels.voxel_hash import HashTable
 
 LANES = 16
 FAR_OFF = np.float32(1e18)
@@ -310,59 +310,3 @@ def first_from(keys, begin, low):
         else:
             end = middle
     return begin
-
-
-@njit(cache=True, nogil=True)
-def fit_local_axes(xyz, normals, found, radius, sample, cell_of_sample, start, stop, axes, spreads):
-    """Find the direction most perpendicular to the normals around sampled points.
-
-    Parameters
-    ----------
-    xyz, normals (n, 3) : points, metres, and unit normals, nan where not known
-    found : FoundCells of edge `radius`
-    radius : within which normals count, metres
-    sample (m,) : indices of the points
-    cell_of_sample (m,) : index of the cell of each
-    start, stop : range of the sample
-    axes (m, 3) : filled with the eigenvector of Σnnᵀ with the least eigenvalue
-    spreads (m, 3) : filled with the eigenvalues, ascending, over the number of normals
-    """
-    order, table_keys, table_ids = found.order, found.table.keys, found.table.ids
-    cell_keys, cell_starts = found.cells.keys, found.cells.starts
-    n_y, n_z = found.cells.n_y, found.cells.n_z
-    mask = np.int64(table_keys.shape[0] - 1)
-    for k in range(start, stop):
-        i = sample[k]
-        px, py, pz = xyz[i, 0], xyz[i, 1], xyz[i, 2]
-        cell = cell_of_sample[k]
-        n = 0
-        xx = xy = xz = yy = yz = zz = 0.0
-        for dx in range(-1, 2):
-            for dy in range(-1, 2):
-                for dz in range(-1, 2):
-                    key = cell_keys[cell] + (dx * n_y + dy) * n_z + dz
-                    slot = slot_of(key, table_keys, mask)
-                    if table_keys[slot] == EMPTY:
-                        continue
-                    c = table_ids[slot]
-                    for row in range(cell_starts[c], cell_starts[c + 1]):
-                        j = order[row]
-                        x, y, z = xyz[j, 0] - px, xyz[j, 1] - py, xyz[j, 2] - pz
-                        if x * x + y * y + z * z <= radius * radius:
-                            a, b, d = normals[j, 0], normals[j, 1], normals[j, 2]
-                            if math.isnan(a):
-                                continue
-                            n += 1
-                            xx += a * a
-                            xy += a * b
-                            xz += a * d
-                            yy += b * b
-                            yz += b * d
-                            zz += d * d
-        axes[k, 0] = axes[k, 1] = axes[k, 2] = math.nan
-        spreads[k, 0] = spreads[k, 1] = spreads[k, 2] = math.nan
-        if n >= 6:
-            least, middle, largest = eigenvalues(xx, xy, xz, yy, yz, zz)
-            x, y, z = eigenvector(xx, xy, xz, yy, yz, zz, least)
-            axes[k, 0], axes[k, 1], axes[k, 2] = x, y, z
-            spreads[k, 0], spreads[k, 1], spreads[k, 2] = least / n, middle / n, largest / n

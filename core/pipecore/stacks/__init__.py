@@ -1,6 +1,5 @@
 """Stacks: the cloud cut into parallel profiles, in several directions (paper, section 3.1)."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,8 @@ from pipecore.errors import SettingsError
 from pipecore.geometry import unit
 from pipecore.progress import Progress
 from pipecore.settings import DirectionPreset, StackSettings
-from pipecore.stacks.directions import AXES, DIAGONALS, automatic_directions, local_axes
+from pipecore.stacks.directions import AXES, DIAGONALS, automatic_directions
+from pipecore.stacks.round_places import find_round_places
 from pipecore.surface import Surface
 from pipecore.types import Stack
 
@@ -38,8 +38,8 @@ def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
 def choose_stacks(
     surface: Surface,
     settings: StackSettings,
+    max_radius: float,
     progress: Progress,
-    find_axes: Callable[[Surface, Progress], NDArray[np.float64]] = local_axes,
 ) -> tuple[Stack, ...]:
     """Return the stacks that the settings ask for: the preset's, then the user's own.
 
@@ -49,9 +49,9 @@ def choose_stacks(
     ----------
     surface : Surface
     settings : StackSettings
+    max_radius : float
+        Largest radius looked for, metres.
     progress : Progress
-    find_axes : callable
-        Gives the local axes of the surface, of which automatic directions are made.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def choose_stacks(
     width = settings.width_mm / 1e3 or WIDTH * surface.voxel
     named: list[tuple[str, ArrayLike, float]] = []
     if settings.preset is DirectionPreset.AUTOMATIC:
-        found = automatic_directions(find_axes(surface, progress))
+        found = automatic_directions(find_round_places(surface, max_radius, progress))
         named += [(f"auto {i}", d, width) for i, d in enumerate(found, start=1)]
     else:
         named += [(describe_direction(d), d, width) for d in preset_directions(settings.preset)]

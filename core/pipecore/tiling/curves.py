@@ -18,7 +18,6 @@ from pipecore.ellipses import Ellipses
 from pipecore.profiles import MAX_SLOPE, stack_cut, stack_frame
 from pipecore.progress import Progress
 from pipecore.settings import Settings
-from pipecore.stacks.directions import REACH, axes_at, sample_positions
 from pipecore.surface import NO_FULL_RESOLUTION_POINTS, Surface
 from pipecore.surface.planes import CellSums, find_planes, sum_cells
 from pipecore.tiling.engine import Engine
@@ -43,20 +42,6 @@ class Facts:
 
     voxel: float
     noise: float
-
-
-def local_axes_in_slabs(engine: Engine, tiled: TiledSurface, progress: Progress) -> Array:
-    """`pipecore.stacks.directions.local_axes` of the whole surface."""
-    total = int(tiled.n_usable.sum())
-    if total == 0:
-        return np.empty((0, 3))
-    positions = sample_positions(total)
-    ends = np.cumsum(tiled.n_usable)
-    tiles = []
-    for slab, n, end in zip(tiled.slabs, tiled.n_usable, ends, strict=True):
-        own = positions[(positions >= end - n) & (positions < end)] - (end - n)
-        tiles.append((slab.surface, tiled.rows_of(slab, REACH), own, tiled.surface.voxel))
-    return np.concatenate(engine.run(axes_of_slab, tiles, "directions", progress))
 
 
 def remove_planes(
@@ -133,18 +118,6 @@ def _batches(
 
 
 # What follows runs on the workers.
-
-
-def axes_of_slab(
-    store: Store, own: Rows, near: Rows, positions: NDArray[np.intp], voxel: float
-) -> Array:
-    """Local axes at some of the points of a slab that have a normal, by their order."""
-    if len(positions) == 0:
-        return np.empty((0, 3))
-    xyz, normals = (np.array(store.open(name)[slice(*near)]) for name in ("surface", "normals"))
-    inside = normals[own[0] - near[0] : own[1] - near[0], 0]
-    sample = own[0] - near[0] + np.flatnonzero(~np.isnan(inside))[positions]
-    return axes_at(xyz, normals, sample, voxel, StopWhenUnwanted(store))
 
 
 def sum_slab_cells(store: Store, number: int, rows: Rows, voxel: float) -> CellSums:

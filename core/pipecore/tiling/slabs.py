@@ -68,15 +68,12 @@ class TiledSurface:
     slabs : tuple of Slab
     planes, plane_starts : ndarray of int64
         The planes that hold downsampled points, and the first of each; one more at the end.
-    n_usable : ndarray of int64
-        Downsampled points with a normal, of each slab.
     """
 
     surface: Surface
     slabs: tuple[Slab, ...]
     planes: NDArray[np.int64]
     plane_starts: NDArray[np.int64]
-    n_usable: NDArray[np.int64]
 
     def rows_of(self, slab: Slab, margin: float) -> Rows:
         """Rows of the downsampled points of a slab and of what is within `margin` voxels of it."""
@@ -217,7 +214,7 @@ def _with_normals(
     store.create("spacing", (m,), np.float64)
     residuals = store.create("residuals", (m,), np.float64)
 
-    def described(noise: float, n_usable: NDArray[np.int64]) -> TiledSurface:
+    def described(noise: float) -> TiledSurface:
         surface = Surface(
             store.open("surface"),
             store.open("normals"),
@@ -226,10 +223,10 @@ def _with_normals(
             edge,
             noise,
         )
-        return TiledSurface(surface, slabs, planes, plane_starts, n_usable)
+        return TiledSurface(surface, slabs, planes, plane_starts)
 
-    unknown = described(np.nan, np.zeros(len(slabs), np.int64))
-    n_usable = engine.run(
+    unknown = described(np.nan)
+    engine.run(
         fit_slab_planes,
         [(slab.surface, unknown.rows_of(slab, WIDEST_NEIGHBOURHOOD), edge) for slab in slabs],
         "normals",
@@ -238,7 +235,7 @@ def _with_normals(
     noise = quantile(residuals, NOISE_QUANTILE, "normals", progress)
     del residuals
     store.remove("residuals")
-    return described(noise, np.array(n_usable))
+    return described(noise)
 
 
 # What follows runs on the workers.
@@ -285,11 +282,10 @@ def downsample_slab(
     return planes, counts
 
 
-def fit_slab_planes(store: Store, own: Rows, near: Rows, edge: float) -> int:
+def fit_slab_planes(store: Store, own: Rows, near: Rows, edge: float) -> None:
     """Fit planes to a slab's downsampled points, with those of the margin around it."""
     xyz = np.array(store.open("surface")[slice(*near)])
     fitted = fit_planes(xyz, edge, StopWhenUnwanted(store))
     inside = slice(own[0] - near[0], own[1] - near[0])
     for name, values in zip(("normals", "residuals", "spacing"), fitted, strict=True):
         store.open(name)[slice(*own)] = values[inside]
-    return int(np.count_nonzero(~np.isnan(fitted[0][inside, 0])))

@@ -2,14 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pipecore.allocation import Allocate
 from pipecore.progress import Progress
 from pipecore.settings import Settings, ThinningSettings
 from pipecore.surface import Surface
-from pipecore.tiling.curves import cut_in_batches, local_axes_in_slabs, remove_planes
+from pipecore.tiling.curves import cut_in_batches, remove_planes
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.slabs import TiledSurface, downsample_in_slabs
 from pipecore.types import PointCloud, Stack
@@ -43,10 +40,6 @@ class InTiles:
             self._engine, len(self.cloud), settings, self._slab_bytes, progress
         )
         return self._tiled.surface
-
-    def local_axes(self, surface: Surface, progress: Progress) -> NDArray[np.float64]:
-        """See `Workspace`."""
-        return local_axes_in_slabs(self._engine, self._known(), progress)
 
     def remove_planes(
         self, surface: Surface, max_radius: float, progress: Progress

@@ -11,7 +11,6 @@ from pipecore._kernels import local_surfaces, nearest_neighbours, voxel_hash
 from pipecore._kernels.grouping import argsort_keys, group_by_label, group_from, group_large
 from pipecore.surface.grid import GridFrame, VoxelCounter, empty_table, table_of
 from pipecore.surface.sorting import CellGrid
-from tests.core.shapes import unit_rows
 
 # Hashing and random numbers wrap around on purpose, which plain numpy warns of.
 pytestmark = [pytest.mark.kernels, pytest.mark.filterwarnings("ignore:overflow encountered")]
@@ -123,31 +122,6 @@ def test_that_planes_are_those_of_all_points_within_reach(rng):
         assert spacings[i] == pytest.approx(np.sqrt(np.pi * (reach * radius) ** 2 / len(near)))
     assert {1, None} < set(reaches)
     assert max(r or 0 for r in reaches) >= 2
-
-
-def test_that_local_axes_are_those_of_all_normals_within_reach(rng):
-    xyz = rng.uniform(0, 1, (80, 3))
-    normals = unit_rows(rng.normal(size=(80, 3)) * [1.0, 0.7, 0.2])
-    normals[::9] = np.nan
-    radius = 0.33
-    grid = CellGrid.build(xyz, radius)
-    sample = np.arange(0, 80, 2)
-    cells = np.searchsorted(grid.cell_keys, GridFrame.of(xyz, radius).keys(xyz[sample]))
-    axes, spreads = np.empty((40, 3)), np.empty((40, 3))
-    local_surfaces.fit_local_axes(
-        xyz, normals, grid.lookup, radius, sample, cells, 0, 40, axes, spreads
-    )
-    n_known = 0
-    for k, i in enumerate(sample):
-        near = (np.linalg.norm(xyz - xyz[i], axis=1) <= radius) & ~np.isnan(normals[:, 0])
-        if near.sum() < 6:
-            assert np.isnan(axes[k]).all()
-            continue
-        n_known += 1
-        values, vectors = np.linalg.eigh(normals[near].T @ normals[near] / near.sum())
-        assert_allclose(spreads[k], values, atol=1e-12)
-        assert abs(axes[k] @ vectors[:, 0]) == pytest.approx(1.0, abs=1e-6)
-    assert n_known > 10
 
 
 def test_that_grouping_lists_the_items_of_each_label_in_order(rng):
