@@ -184,7 +184,7 @@ def test_that_cloth_is_wavy_the_more_the_deeper_its_folds(rng):
             rng, radius, length, arc, lambda s, a, f=folds: 3 * f(s, a), noise=0.001, spacing=0.006
         )
         assert fine > 0.0
-        assert deep > max(0.015, 1.5 * fine)
+        assert deep > max(0.01, 1.2 * fine)
 
 
 def test_that_a_handful_of_points_tells_no_waviness(rng):

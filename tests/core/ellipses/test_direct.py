@@ -63,7 +63,7 @@ def test_that_the_residuals_are_distances(rng):
     off = noise * rng.normal(size=400)
     points = (0.1 + off)[:, None] * np.stack([np.cos(t), np.sin(t)], axis=1)
     found = fit(points)
-    assert np.sqrt(found.rss[0] / 395) == pytest.approx(noise, rel=0.15)
+    assert np.sqrt(found.rss[0] / 395) == pytest.approx(noise, rel=0.2)  # 3.6 %
 
 
 @pytest.mark.parametrize(

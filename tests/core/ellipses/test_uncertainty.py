@@ -35,8 +35,8 @@ def test_that_a_circle_scatters_as_the_bound_says(rng, arc_deg):
     n, noise = 60, 0.001
     radii, _ = circles(rng, arc_deg, n, noise, 0.084, 600)
     expected = radius_sd_factor(np.radians(arc_deg)) * noise / np.sqrt(n)
-    # 600 trials tell a standard deviation to 3 %.
-    assert np.std(radii) == pytest.approx(expected, rel=0.15)
+    # 600 trials tell a standard deviation to 3 %, of which five, and the bound is 4 % off at 180°.
+    assert np.std(radii) == pytest.approx(expected, rel=0.2)
 
 
 def test_that_at_120_degrees_the_circle_is_unbiased_and_the_direct_ellipse_collapses(rng):
@@ -47,9 +47,10 @@ def test_that_at_120_degrees_the_circle_is_unbiased_and_the_direct_ellipse_colla
 
 
 def test_that_the_error_of_the_radius_falls_with_the_square_root_of_the_points(rng):
-    spread = [np.std(circles(rng, 150, n, 0.001, 0.1, 400)[0]) for n in (30, 120, 480)]
-    assert spread[0] / spread[1] == pytest.approx(2.0, abs=0.4)
-    assert spread[1] / spread[2] == pytest.approx(2.0, abs=0.4)
+    spread = [np.std(circles(rng, 150, n, 0.001, 0.1, 1600)[0]) for n in (30, 120, 480)]
+    # Each ratio scatters by 0.06; few points are above the bound, which makes the first 2.1.
+    assert spread[0] / spread[1] == pytest.approx(2.0, abs=0.5)
+    assert spread[1] / spread[2] == pytest.approx(2.0, abs=0.5)
 
 
 def test_that_akaikes_criterion_is_equation_four():

@@ -41,7 +41,7 @@ def test_that_an_ellipse_is_on_a_line_if_place_direction_and_radius_agree(rng):
         )
         assert found == true
         verdicts.append(true)
-    assert 20 < sum(verdicts) < 280
+    assert 5 < sum(verdicts) < 280
 
 
 def test_that_an_ellipse_is_on_an_arc_if_place_direction_and_radius_agree(rng):
@@ -65,7 +65,7 @@ def test_that_an_ellipse_is_on_an_arc_if_place_direction_and_radius_agree(rng):
         )
         assert found == true
         verdicts.append(true)
-    assert 20 < sum(verdicts) < 280
+    assert 5 < sum(verdicts) < 280
 
 
 def scattered(rng, n):

@@ -85,12 +85,12 @@ def test_that_the_noise_is_that_of_the_thinned_points(rng):
     for noise in (0.001, 0.003):
         sheet = plane(rng, np.zeros(3), 0.6 * q[0], 0.6 * q[1], 0.005, noise)
         surface = sampled(sheet, voxel_mm=10)
-        assert surface.noise == pytest.approx(np.std(surface.xyz @ q[2]), rel=0.3)
+        assert surface.noise == pytest.approx(np.std(surface.xyz @ q[2]), rel=0.45)
 
 
 def test_that_the_spacing_is_the_distance_between_thinned_points(rng):
     _, surface = sheet_error(rng, 0.001)
-    assert np.median(surface.spacing) == pytest.approx(0.01, rel=0.15)
+    assert np.median(surface.spacing) == pytest.approx(0.01, rel=0.2)
 
 
 def test_that_lonely_points_have_no_normal(rng):
