@@ -64,6 +64,11 @@ class Proposal:
     low: float = 0.0
     high: float = 0.0
 
+    @property
+    def length(self) -> float:
+        """Extent along the axis, in the unit of `low` and `high`."""
+        return self.high - self.low
+
 
 @dataclass(frozen=True, eq=False)
 class _Rows:

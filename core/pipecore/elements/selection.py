@@ -1,4 +1,4 @@
-"""Which pieces hold: refined the surest first, each surface taken once."""
+"""Selection: proposals refined the best supported first, each surface accepted once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,62 +19,92 @@ from pipecore.elements.speculative_refinement import refine_speculatively
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
 
-SHORT = 1.5
-"""Straights of fewer radii wait for the bends: they may be part of one."""
+MIN_STRAIGHT_RADII = 1.5
+"""Shorter straights wait for the bends: they may be part of one; radii."""
 
 
 def select_elements(
-    pieces: list[Proposal], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
+    proposals: list[Proposal], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
 ) -> tuple[list[FittedElement], list[Link]]:
-    """Refine what was proposed, the surest first; drop what does not hold.
+    """Refine proposals, the best supported first, and keep those that pass the gates.
 
-    Returns the fitted pieces, and pairs (fitting, straight) that belong together.
-
-    Spheres and long straights come first, then the fittings that these ask for, then
+    Spheres and long straights come first, then the fittings between these straights, then
     the bends and short straights that the ellipses show on their own.
+
+    Parameters
+    ----------
+    proposals : list of Proposal
+        In any order.
+    nearby : NearbyPoints
+    settings : ElementSettings
+    progress : Progress
+        Receives fractions of the stage "elements".
+
+    Returns
+    -------
+    fitted : list of FittedElement
+    links : list of (int, int)
+        Numbers of fittings and of the straights that they were fitted to.
     """
-    keeper = Selector(nearby, settings)
-    spheres, straights, rest = _by_support(pieces)
-    keeper.try_pieces(spheres, progress, (0.3, 0.31))
-    put_off = keeper.try_pieces(straights, progress, (0.31, 0.65), min_lengths=SHORT)
+    selector = Selector(nearby, settings)
+    spheres, straights, rest = _by_support(proposals)
+    selector.try_proposals(spheres, progress, (0.3, 0.31))
+    short = selector.try_proposals(
+        straights, progress, (0.31, 0.65), min_lengths=MIN_STRAIGHT_RADII
+    )
     progress.update("elements", 0.65)
-    joinable = list(keeper.fitted)
-
-    for corner, bend_radius, ends in find_corners(joinable, nearby, progress, (0.65, 0.67)):
+    for corner, bend_radius, ends in find_corners(
+        list(selector.fitted), nearby, progress, (0.65, 0.67)
+    ):
         progress.update("elements", 0.67)
-        keeper.try_bend(corner, bend_radius, ends)
-    keeper.try_reducers()
-    keeper.extend_open_ends(progress)
-    for ring in find_flanges(list(keeper.fitted), nearby, keeper.is_free):
+        selector.try_bend(corner, bend_radius, ends)
+    selector.try_reducers()
+    selector.extend_open_ends(progress)
+    for ring in find_flanges(list(selector.fitted), nearby, selector.is_free):
         progress.update("elements", 0.7)
-        keeper.keep(ring)
-    keeper.try_pieces(put_off + rest, progress, (0.7, 0.95))
-    keeper.try_reducers()  # also between what has been found since
+        selector.accept(ring)
+    selector.try_proposals(short + rest, progress, (0.7, 0.95))
+    selector.try_reducers()  # also between what has been found since
     progress.update("elements", 1.0)
-    return keeper.result()
+    return selector.result()
 
 
-def _by_support(pieces: list[Proposal]) -> tuple[list[Proposal], list[Proposal], list[Proposal]]:
+def _by_support(proposals: list[Proposal]) -> tuple[list[Proposal], list[Proposal], list[Proposal]]:
     """Spheres, long straights and the rest, each with most ellipses first.
 
-    Equal counts are told apart by place, not by the order in which they were found.
+    Equal counts are ordered by radius and position, so that the order of the list is no matter.
     """
     groups: tuple[list[Proposal], list[Proposal], list[Proposal]] = ([], [], [])
-    for piece in sorted(
-        pieces, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
+    for proposal in sorted(
+        proposals, key=lambda p: (-len(p.ellipses), p.model.radius, *p.model.position.tolist())
     ):
-        match piece.model:
+        match proposal.model:
             case SphereSurface():
-                groups[0].append(piece)
-            case LineSurface(is_tapered=False, radius=r) if piece.high - piece.low > LONG_PIECE * r:
-                groups[1].append(piece)
+                groups[0].append(proposal)
+            case LineSurface(is_tapered=False, radius=r) if proposal.length > LONG_PIECE * r:
+                groups[1].append(proposal)
             case _:
-                groups[2].append(piece)
+                groups[2].append(proposal)
     return groups
 
 
 class Selector:
-    """Keeps the fitted pieces and which downsampled points they have taken."""
+    """The accepted elements, and which downsampled points are still free.
+
+    Parameters
+    ----------
+    nearby : NearbyPoints
+    settings : ElementSettings
+
+    Attributes
+    ----------
+    fitted : list of FittedElement
+        Accepted so far.
+    is_free : ndarray of bool
+        Downsampled points that are on none of them.
+    links : list of (int, int)
+        Numbers of fittings and of the straights that they were fitted to.
+    """
 
     def __init__(self, nearby: NearbyPoints, settings: ElementSettings) -> None:
         self.fitted: list[FittedElement] = []
@@ -85,48 +115,50 @@ class Selector:
         self._joined: set[End] = set()
         self._replaced: set[int] = set()
 
-    def try_pieces(
+    def try_proposals(
         self,
-        pieces: list[Proposal],
+        proposals: list[Proposal],
         progress: Progress,
         span: tuple[float, float],
         min_lengths: float = 0.0,
     ) -> list[Proposal]:
-        """Refine pieces, several at once, and keep those that hold in their turn.
+        """Refine proposals, several at once, and accept those that are valid in their turn.
 
-        Returns those that hold but are shorter than `min_lengths` radii; they are not kept.
+        Returns those that could be fitted but are shorter than `min_lengths` radii; they are
+        not accepted.
         """
 
-        def refine(piece: Proposal, used: list[NDArray[np.intp]]) -> FittedElement | None:
-            return self._refine(piece, self.is_free, used)
+        def refine(proposal: Proposal, used: list[NDArray[np.intp]]) -> FittedElement | None:
+            return self._refine(proposal, self.is_free, used)
 
         short = []
-        for piece, found in refine_speculatively(pieces, refine, self.is_free, progress, span):
+        refined = refine_speculatively(proposals, refine, self.is_free, progress, span)
+        for proposal, found in refined:
             if found is None:
                 continue
             if found.axis.length < min_lengths * found.fit.model.radius:
-                short.append(piece)
+                short.append(proposal)
             else:
                 self._accept_if_valid(found)
         return short
 
-    def try_piece(self, piece: Proposal, between: tuple[End, ...] | None = None) -> None:
-        """Refine a piece and keep it if it holds; see `_usable` for `between`."""
+    def try_proposal(self, proposal: Proposal, between: tuple[End, ...] | None = None) -> None:
+        """Refine a proposal and accept it if it is valid; see `_usable` for `between`."""
         usable = self._usable(between)
         if usable is not None:
-            self._accept_if_valid(self._refine(piece, usable), between)
+            self._accept_if_valid(self._refine(proposal, usable), between)
 
     def try_bend(self, corner: Corner, bend_radius: float, between: tuple[End, ...]) -> None:
-        """Fit a bend at a corner and keep it if it holds."""
+        """Fit a bend at a corner and accept it if it is valid."""
         usable = self._usable(between)
         if usable is not None:
             found = fit_bend(corner, bend_radius, self._nearby, usable)
             self._accept_if_valid(found, between)
 
     def try_reducers(self) -> None:
-        """Fit reducers between straights on one line and keep those that hold.
+        """Fit reducers between straights on one line and accept those that are valid.
 
-        A straight that was found in the side of one gives way to it.
+        A straight that was found in the side of a reducer is replaced by it.
         """
         for step in find_steps(self.fitted):
             between = step.one.which, step.other.which
@@ -151,20 +183,20 @@ class Selector:
             end = ends.pop(0)
             if end.which in self._joined:
                 continue
-            followed = extend_open_end(end, self._nearby, self.is_free)
-            if followed is None:
+            extension = extend_open_end(end, self._nearby, self.is_free)
+            if extension is None:
                 continue
-            bend, straight = followed
+            bend, straight = extension
             n = len(self.fitted)
             if straight is not None:
-                self.try_piece(straight)
+                self.try_proposal(straight)
             new = straight_ends(self.fitted, n)
             for other in new:
                 corner = corner_between(self.fitted, end, other, self._nearby)
                 if corner is not None:
                     self.try_bend(corner[1], corner[2], (end.which, other.which))
             if end.which not in self._joined:
-                self.try_piece(bend, between=(end.which,))
+                self.try_proposal(bend, between=(end.which,))
             ends += new
 
     def _usable(self, between: tuple[End, ...] | None) -> NDArray[np.bool_] | None:
@@ -183,12 +215,12 @@ class Selector:
 
     def _refine(
         self,
-        piece: Proposal,
+        proposal: Proposal,
         usable: NDArray[np.bool_],
         used: list[NDArray[np.intp]] | None = None,
     ) -> FittedElement | None:
         return refine_proposal(
-            piece,
+            proposal,
             self._nearby,
             usable,
             lambda rough, slack: passes_gates(rough, self._nearby.surface, self._settings, slack),
@@ -202,11 +234,11 @@ class Selector:
             return False
         if is_rounded_corner(found, self._nearby):
             return False
-        self.keep(found, between)
+        self.accept(found, between)
         return True
 
-    def keep(self, found: FittedElement, between: tuple[End, ...] | None = None) -> None:
-        """Keep what holds; its points are taken, and the ends that it joins."""
+    def accept(self, found: FittedElement, between: tuple[End, ...] | None = None) -> None:
+        """Add an element; its points are no longer free, nor are the ends that it joins."""
         if between is not None:
             self._joined.update(between)
             self.links += [(len(self.fitted), i) for i, _ in between]
@@ -214,8 +246,8 @@ class Selector:
         self.fitted.append(found)
 
     def result(self) -> tuple[list[FittedElement], list[Link]]:
-        """The pieces and links, without those that gave way to others."""
-        left = [i for i in range(len(self.fitted)) if i not in self._replaced]
-        number = {i: k for k, i in enumerate(left)}
+        """The accepted elements and links, without those that were replaced by others."""
+        remaining = [i for i in range(len(self.fitted)) if i not in self._replaced]
+        number = {i: k for k, i in enumerate(remaining)}
         links = [(number[a], number[b]) for a, b in self.links if {a, b} <= number.keys()]
-        return [self.fitted[i] for i in left], links
+        return [self.fitted[i] for i in remaining], links

@@ -17,9 +17,9 @@ from pipecore.tiling.store import Store, check_access
 if TYPE_CHECKING:
     from distributed import Client
 
-PATIENCE = 0.2
+UPDATE_SECONDS = 0.2
 """Progress is reported, and cancelling noticed, at least this often, seconds."""
-ALONE = 20.0
+MAX_SECONDS_WITHOUT_WORKERS = 20.0
 """A cluster may be without workers for so long, seconds: lost ones are started again."""
 _CONNECT_TIMEOUT = "5s"
 _CALM = {
@@ -90,17 +90,19 @@ class Engine:
         progress.update(stage, begin)
         futures = [self._client.submit(work, self.store, *tile, pure=False) for tile in tiles]
         pending = set(futures)
-        company, results = _Company(self._client), {}
+        watch, results = _WorkerWatch(self._client), {}
         try:
             while pending:
                 try:
-                    done, pending = wait(pending, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+                    done, pending = wait(
+                        pending, timeout=UPDATE_SECONDS, return_when="FIRST_COMPLETED"
+                    )
                 except TimeoutError:
                     done = set()
                 for future in done:
                     results[future] = future.result()
                 if not (done or self._is_local):
-                    company.check()
+                    watch.check()
                 share = 1.0 - len(pending) / max(len(futures), 1)
                 progress.update(stage, begin + (end - begin) * share)
             return [results[future] for future in futures]
@@ -117,7 +119,7 @@ class Engine:
             raise
 
 
-class _Company:
+class _WorkerWatch:
     """Looks whether a cluster still has workers."""
 
     def __init__(self, client: "Client") -> None:
@@ -127,14 +129,14 @@ class _Company:
     def check(self) -> None:
         """Raise `PipecoreError` if it has had none for too long; ask once a second."""
         now = time.monotonic()
-        if now - self._looked < min(1.0, ALONE):
+        if now - self._looked < min(1.0, MAX_SECONDS_WITHOUT_WORKERS):
             return
         self._looked = now
-        # Nothing is told while there is no connection.
+        # There is no entry while there is no connection.
         workers = self._client.scheduler_info(n_workers=-1).get("workers")
         if workers:
             self._seen = now
-        elif now - self._seen > ALONE:
+        elif now - self._seen > MAX_SECONDS_WITHOUT_WORKERS:
             raise PipecoreError(_NO_ANSWER if workers is None else _NO_WORKERS)
 
 

@@ -84,8 +84,8 @@ def tile_bytes(n_points: int, limit: int, n_at_once: int) -> int:
     return max(SMALLEST_TILE, math.floor(left / n_at_once))
 
 
-OFTEN, SELDOM = 0.1, 2.0
-"""Between two looks at the memory, and after a look that could not help, seconds."""
+POLL_SECONDS, POLL_SECONDS_IN_VAIN = 0.1, 2.0
+"""Between two readings of the memory in use, and after one that could not be lowered."""
 FULL = 0.8
 """From this share of the limit on, pages of files are given back."""
 
@@ -103,14 +103,14 @@ def keeping_within(limit: int) -> Iterator[None]:
     trim = _trimmer()
 
     def look() -> None:
-        pause = OFTEN
+        pause = POLL_SECONDS
         while not is_over.wait(pause):
-            pause = OFTEN
+            pause = POLL_SECONDS
             if process.memory_info().rss > FULL * limit:
                 drop_pages()
                 trim()
                 if process.memory_info().rss > FULL * limit:
-                    pause = SELDOM
+                    pause = POLL_SECONDS_IN_VAIN
 
     watch = threading.Thread(target=look, name="pipecore memory", daemon=True)
     watch.start()

@@ -10,12 +10,14 @@ from pipecore.progress import Progress, in_chunks
 Array = NDArray[np.float64]
 
 BLOCK = 2_000_000
-FEW = 2_000_000
-"""So many values are sorted in memory."""
+MAX_SORTED_VALUES = 2_000_000
+"""Values that may be sorted in memory."""
 N_BINS = 4096
 
 
-def quantile(values: Array, q: float, stage: str, progress: Progress, few: int = FEW) -> float:
+def quantile(
+    values: Array, q: float, stage: str, progress: Progress, few: int = MAX_SORTED_VALUES
+) -> float:
     """Return a quantile of an array in a file, as `numpy.nanquantile` does.
 
     The range that holds the wanted ranks is narrowed by counting until it holds few values.

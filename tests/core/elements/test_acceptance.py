@@ -63,7 +63,7 @@ def test_that_each_fault_of_a_pipe_is_told_by_its_gate(pipe):
     assert gate_of(pipe, fit=replace(fit, sigma=0.01)) == "scatter_is_low"
     unsure = with_sd(fit.model, 0.05 * radius)
     assert gate_of(pipe, fit=unsure) == "radius_is_well_determined"
-    assert gate_of(pipe, misfit=0.03 * radius) == "is_round"
+    assert gate_of(pipe, misfit=0.03 * radius) == "section_is_round"
     assert gate_of(pipe, extent=replace(extent, coverage=0.4)) == "axis_is_covered"
     short_arc = replace(extent, arc=np.deg2rad(50))
     vague = with_sd(fit.model, 0.008 * radius)
@@ -85,7 +85,7 @@ def test_that_a_first_round_is_given_slack(pipe):
     found, surface = pipe
     radius = found.fit.model.radius
     rough = replace(found, misfit=0.02 * radius + 0.4 * NOISE)
-    assert failed_gate(rough, surface, SETTINGS) == "is_round"
+    assert failed_gate(rough, surface, SETTINGS) == "section_is_round"
     assert failed_gate(rough, surface, SETTINGS, slack=1.5) is None
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore.elements.fittings.reducers import Step, find_steps, fit_reducer
+from pipecore.elements.fittings.reducers import RadiusStep, find_steps, fit_reducer
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import FittedElement
@@ -152,7 +152,7 @@ def test_that_a_cylinder_in_the_side_of_a_reducer_may_be_part_of_it_and_others_n
         (LineAxis(origin + 1.25 * along, along, 1.0), 0.07),
     ]
     (step,) = find_steps([straight(*end) for end in ends])
-    assert isinstance(step, Step)
+    assert isinstance(step, RadiusStep)
     inside = LineAxis(origin + 1.02 * along, unit(along + 0.06 * across), 0.2)
     assert step.has_between(straight(inside, 0.085))
     assert not step.has_between(straight(inside, 0.06))

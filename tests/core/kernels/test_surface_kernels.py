@@ -232,7 +232,7 @@ def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch,
 
     every, spacing = found(is_rough=False)
     assert_array_equal(found(is_rough=True)[0], every)
-    monkeypatch.setattr("pipecore.elements.refinement.nearby_points.FEW", 200)
+    monkeypatch.setattr("pipecore.elements.refinement.nearby_points.ROUGH_SAMPLE_POINTS", 200)
     some, wider = found(is_rough=True)
     assert np.isin(some, every).all()
     assert 10 < len(some) < 220 < len(every)
@@ -241,7 +241,7 @@ def test_that_a_rough_look_samples_where_there_are_many_points(rng, monkeypatch,
     assert_array_equal(found(is_rough=False)[0], every)
 
 
-def test_that_points_behind_thinned_ones_are_in_the_order_of_their_places(rng):
+def test_that_full_resolution_points_of_downsampled_ones_are_in_the_order_of_their_places(rng):
     points, xyz, parent = cloud_around(rng, axes_of(rng)[0], n=50)
     chosen = np.array([3, 7, 20])
     index, places, normals = points.full_resolution_with_normals(chosen)

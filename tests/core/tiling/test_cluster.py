@@ -133,7 +133,7 @@ def lose_scheduler(cluster: LocalCluster) -> None:
 def test_that_a_cluster_that_is_gone_is_told_and_leaves_nothing(
     scanned, tmp_path, monkeypatch, lose, told
 ):
-    monkeypatch.setattr(engine, "ALONE", 0.5)
+    monkeypatch.setattr(engine, "MAX_SECONDS_WITHOUT_WORKERS", 0.5)
     with start_cluster() as cluster:
         progress = InTheMiddle("profiles", lambda: lose(cluster))
         with (

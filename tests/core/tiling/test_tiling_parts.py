@@ -139,7 +139,7 @@ def test_that_memory_of_files_is_given_back_near_the_limit(tmp_path):
 
 
 def test_that_memory_is_left_alone_far_from_the_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr(memory, "OFTEN", 0.01)
+    monkeypatch.setattr(memory, "POLL_SECONDS", 0.01)
     monkeypatch.setattr(memory, "drop_pages", lambda: pytest.fail("it was far"))
     with keeping_within(2**50):
         time.sleep(0.1)

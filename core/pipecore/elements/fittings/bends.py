@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore._kernels import bend_support as kernels
+from pipecore.elements.fittings.constrained import FittingInliers, complete_fitting
 from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
-from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement, axis_through
+from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,
     SurfaceFit,
-    fit_surface,
 )
 from pipecore.elements.runs.ends import End
 from pipecore.geometry import ArcAxis, cross, unit
@@ -339,23 +338,14 @@ def _fitted(
     on = in_bend & (cosine > RADIAL_COS) & (np.abs(residual) < max(5.0 * sigma, 0.0025))
     if on.sum() < MIN_POINTS:
         return None
-    own = ball[on]
     chainage, _, clock = axis.pipe_coordinates(xyz[on])
-    lean = normal_angle(normals[on], outward[on], axis.tangent(chainage))
-    extent = find_extent(
-        chainage, clock, residual[on], lean, lambda *_: np.empty((2, 0)),
-        axis.length, radius, nearby.usual_spacing(own), sigma,
-    )  # fmt: skip
-    if extent is None:
-        return None
-    covered = extent.coverage * (extent.high - extent.low) / axis.length
-    extent = Extent(0.0, axis.length, extent.arc, min(covered, 1.0), extent.gaps)
-    misfit = section_misfit(clock, residual[on], extent.arc)
-    free = fit_surface(model, nearby.full_resolution_with_normals(own)[1], 3.0 * sigma)
-    if free is not None and np.sqrt(free.covariance[5, 5]) < FREE_SD * bend_radius:
-        ends = np.stack([axis.start, axis.end])
-        return FittedElement(free, axis_through(free.model, ends), own, extent, misfit)
+    angle = normal_angle(normals[on], outward[on], axis.tangent(chainage))
     covariance = np.zeros((7, 7))
     covariance[5, 5], covariance[6, 6] = sds[0] ** 2, sds[1] ** 2
-    fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
-    return FittedElement(fit, axis, own, extent, misfit)
+    return complete_fitting(
+        SurfaceFit(model, covariance, sigma, int(on.sum())),
+        axis,
+        FittingInliers(ball[on], chainage, clock, residual[on], angle),
+        nearby,
+        lambda free: bool(np.sqrt(free.covariance[5, 5]) < FREE_SD * bend_radius),
+    )

@@ -13,14 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.elements.fittings.constrained import FittingInliers, complete_fitting
 from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
-from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement, axis_through
+from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement
 from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SurfaceFit,
-    fit_surface,
 )
 from pipecore.geometry import LineAxis, unit
 from pipecore.robust import robust_sd, sample_evenly
@@ -56,7 +55,7 @@ FREE_SD = 0.006
 """A reducer whose own points carry its radius to this share needs no straights for it."""
 
 
-def find_steps(fitted: list[FittedElement]) -> list["Step"]:
+def find_steps(fitted: list[FittedElement]) -> list["RadiusStep"]:
     """Straights on one line but of different radii, near each other; the furthest first.
 
     What lies between two is then known before it may be taken for a straight itself.
@@ -70,7 +69,7 @@ def _is_pipe(straight: FittedElement) -> bool:
     return straight.axis.length > MIN_PIPE * straight.fit.model.radius
 
 
-def _steps(ends: list[StraightEnd]) -> Iterator["Step"]:
+def _steps(ends: list[StraightEnd]) -> Iterator["RadiusStep"]:
     if not ends:
         return
     points, radii = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
@@ -79,7 +78,7 @@ def _steps(ends: list[StraightEnd]) -> Iterator["Step"]:
         is_near = np.square(points[a + 1 :] - one.point).sum(axis=1) < furthest**2
         for b in (np.flatnonzero(is_near) + a + 1).tolist():
             if _may_be_joined(one, ends[b]):
-                yield Step(one, ends[b])
+                yield RadiusStep(one, ends[b])
 
 
 def _may_be_joined(one: StraightEnd, other: StraightEnd) -> bool:
@@ -95,7 +94,7 @@ def _may_be_joined(one: StraightEnd, other: StraightEnd) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class RadiusStep:
     """Two straights on one line, and what lies between them.
 
     Chainage is counted along their common direction from the end of the first.
@@ -185,7 +184,7 @@ class Step:
 
 
 def fit_reducer(
-    step: Step,
+    step: RadiusStep,
     straights: tuple[FittedElement, FittedElement],
     nearby: NearbyPoints,
     usable: NDArray[np.bool_],
@@ -194,7 +193,7 @@ def fit_reducer(
 
     Parameters
     ----------
-    step : Step
+    step : RadiusStep
     straights : tuple of FittedElement
         Those of its ends.
     nearby : NearbyPoints
@@ -226,7 +225,9 @@ def fit_reducer(
     return _fitted(step, begin, end, straights, nearby, points, band)
 
 
-def _best_ends(step: Step, xyz: Array, low: float, high: float, band: float) -> tuple[float, float]:
+def _best_ends(
+    step: RadiusStep, xyz: Array, low: float, high: float, band: float
+) -> tuple[float, float]:
     """Chainages between which the cone leaves least of the points' distances."""
     best = (np.inf, low, high)
     begins = ends = np.linspace(low, high, N_TRIED)
@@ -245,7 +246,7 @@ def _best_ends(step: Step, xyz: Array, low: float, high: float, band: float) -> 
 
 
 def _fitted(
-    step: Step,
+    step: RadiusStep,
     begin: float,
     end: float,
     straights: tuple[FittedElement, FittedElement],
@@ -263,27 +264,18 @@ def _fitted(
     beside = between & (rho > step.narrow - band) & (rho < step.wide + band)
     if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
         return None
-    own, sigma = points[on], max(robust_sd(residual[on]), LEAST_SIGMA)
-    lean = normal_angle(normals[on], outward[on], axis.tangent(chainage[on]))
-    extent = find_extent(
-        chainage[on], clock[on], residual[on], lean, lambda *_: np.empty((2, 0)),
-        axis.length, model.radius, nearby.usual_spacing(own), sigma,
-    )  # fmt: skip
-    if extent is None:
-        return None
-    covered = min(extent.coverage * (extent.high - extent.low) / axis.length, 1.0)
-    extent = Extent(0.0, axis.length, extent.arc, covered, extent.gaps)
-    misfit = section_misfit(clock[on], residual[on], extent.arc)
-    free = fit_surface(model, nearby.full_resolution(own)[1], 3.0 * sigma)
-    if free is not None and free.radius_sd < FREE_SD * free.model.radius:
-        ends = np.stack([axis.start, axis.end])
-        return FittedElement(free, axis_through(free.model, ends), own, extent, misfit)
+    sigma = max(robust_sd(residual[on]), LEAST_SIGMA)
+    angle = normal_angle(normals[on], outward[on], axis.tangent(chainage[on]))
     sds = np.array([s.radius_sd for s in straights])
     across = sigma**2 / on.sum()
     tilt = 12.0 * across / axis.length**2
     covariance = np.diag(
         [across, across, tilt, tilt, (sds @ sds) / 4, (sds @ sds) / axis.length**2]
     )
-    return FittedElement(
-        SurfaceFit(model, covariance, sigma, int(on.sum())), axis, own, extent, misfit
+    return complete_fitting(
+        SurfaceFit(model, covariance, sigma, int(on.sum())),
+        axis,
+        FittingInliers(points[on], chainage[on], clock[on], residual[on], angle),
+        nearby,
+        lambda free: free.radius_sd < FREE_SD * free.model.radius,
     )

@@ -1,4 +1,4 @@
-"""Ends of straights, which tell of the fittings between them."""
+"""Ends of straights, from which the fittings between them are found."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,17 @@ NO_ELLIPSES: NDArray[np.intp] = np.empty(0, np.intp)
 
 
 class StraightEnd(NamedTuple):
-    """An end of a straight: which, where, the direction out of it, and its radius."""
+    """An end of a fitted straight.
+
+    Parameters
+    ----------
+    which : (int, int)
+        Number of the straight; 0 for its start, 1 for its end.
+    point, outward : ndarray, shape (3,)
+        Where it is, metres, and the unit vector along the axis out of the pipe.
+    radius : float
+        Metres.
+    """
 
     which: End
     point: Array
@@ -23,7 +33,19 @@ class StraightEnd(NamedTuple):
 
 
 def straight_ends(fitted: list[FittedElement], first: int = 0) -> list[StraightEnd]:
-    """Ends of the cylinders, from the piece with the number `first` on."""
+    """List the ends of the cylinders among some elements.
+
+    Parameters
+    ----------
+    fitted : list of FittedElement
+    first : int
+        Elements with lower numbers are skipped.
+
+    Returns
+    -------
+    list of StraightEnd
+        Start and end of each, in the order of the elements.
+    """
     ends = []
     for i, f in enumerate(fitted[first:], start=first):
         if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered:
@@ -34,7 +56,19 @@ def straight_ends(fitted: list[FittedElement], first: int = 0) -> list[StraightE
 
 
 def normal_angle(normals: Array, outward: Array, tangent: Array) -> Array:
-    """Angle from the surface's outward normals to the points' own, towards increasing clock."""
+    """Angle from the surface's normals to the points' own, towards increasing clock.
+
+    Parameters
+    ----------
+    normals, outward, tangent : ndarray, shape (n, 3)
+        Unit normals of the points, of either sign; outward unit normals of the surface; unit
+        tangents of the axis.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Radians, in (-π/2, π/2).
+    """
     clockwise = np.cross(tangent, outward)
     ahead = np.einsum("ij,ij->i", normals, clockwise)
     out = np.einsum("ij,ij->i", normals, outward)

@@ -1,7 +1,7 @@
-"""What a refined piece must show before it counts as an element: a table of gates.
+"""Acceptance: what a fitted element must show before it is reported, a table of gates.
 
-Each gate is a sentence that a piece fulfils or not. A piece that fails one is no pipe
-element but a corner, a bundle, a person or a chance. See `GATES` at the end.
+Each gate is a predicate named by what it demands. What fails one is no pipe element but a
+corner, a bundle, a person or a chance fit. See `GATES` at the end.
 """
 
 from collections.abc import Callable
@@ -49,8 +49,18 @@ WIDE, WHOLE_ARC, MIN_WIDE_LENGTH = 0.18, np.deg2rad(200.0), 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """A refined piece before its gates; `slack` eases what a last round of fitting can mend."""
+class Candidate:
+    """A fitted element before its gates.
+
+    Parameters
+    ----------
+    found : FittedElement
+    settings : ElementSettings
+    surface : Surface
+        The downsampled points.
+    slack : float
+        At least 1; relaxes the limits of what a last round of fitting can improve.
+    """
 
     found: FittedElement
     settings: ElementSettings
@@ -69,155 +79,174 @@ class Trial:
 
     @property
     def relative_sd(self) -> float:
-        """Standard deviation of the radius as a share of it, eased."""
+        """Standard deviation of the radius as a share of it, relaxed by the slack."""
         return self.found.fit.radius_sd / self.slack**2 / self.radius
 
     @property
     def misfit(self) -> float:
-        """How far the section leaves its shape, eased, metres."""
+        """Root mean square by which the section leaves its shape, relaxed by the slack, metres."""
         return self.found.misfit / self.slack
 
     @property
     def arc(self) -> float:
-        """Median arc that is seen, radians."""
+        """Median arc that the points cover, radians."""
         return self.found.extent.arc
 
 
-def radius_is_within_limits(t: Trial) -> bool:
-    """The radius is within the settings' limits."""
-    return t.settings.min_radius_mm <= t.radius * 1e3 <= t.settings.max_radius_mm
+def radius_is_within_limits(candidate: Candidate) -> bool:
+    """Whether the radius is within the settings' limits."""
+    return (
+        candidate.settings.min_radius_mm
+        <= candidate.radius * 1e3
+        <= candidate.settings.max_radius_mm
+    )
 
 
-def scatter_is_low(t: Trial) -> bool:
-    """The points scatter about the surface hardly more than they do about their planes."""
-    wavy = _allowed_waviness(t, *SCATTER)
-    limit = min(max(4.0 * t.surface.noise, 0.004, wavy), 0.08 * t.radius)
-    return bool(t.found.fit.sigma <= t.slack * limit)
+def scatter_is_low(candidate: Candidate) -> bool:
+    """Whether the points scatter about the surface hardly more than about their local planes."""
+    wavy = _allowed_waviness(candidate, *SCATTER)
+    limit = min(max(4.0 * candidate.surface.noise, 0.004, wavy), 0.08 * candidate.radius)
+    return bool(candidate.found.fit.sigma <= candidate.slack * limit)
 
 
-def _allowed_waviness(t: Trial, least: float, most: float) -> float:
+def _allowed_waviness(candidate: Candidate, least: float, most: float) -> float:
     """How far a surface may leave its shape, metres: what is seen widely and long may more.
 
     From 100° to 200° of arc and from one to four radii of length it rises from the least to
     the most share of the radius.
     """
-    wide = (t.arc - np.deg2rad(100.0)) / np.deg2rad(100.0)
-    long = (t.lengths - 1.0) / 3.0
+    wide = (candidate.arc - np.deg2rad(100.0)) / np.deg2rad(100.0)
+    long = (candidate.lengths - 1.0) / 3.0
     share = float(np.clip(wide, 0.0, 1.0) * np.clip(long, 0.0, 1.0))
-    return (least + (most - least) * share) * t.radius
+    return (least + (most - least) * share) * candidate.radius
 
 
-def radius_is_well_determined(t: Trial) -> bool:
-    """The points carry the radius at all."""
-    return t.relative_sd <= MAX_RADIUS_SD
+def radius_is_well_determined(candidate: Candidate) -> bool:
+    """Whether the standard deviation of the radius is small enough for any kind."""
+    return candidate.relative_sd <= MAX_RADIUS_SD
 
 
-def has_enough_points(t: Trial) -> bool:
-    """A sphere shows more than a handful of points."""
-    return len(t.found.inliers) >= MIN_SPHERE_POINTS
+def has_enough_points(candidate: Candidate) -> bool:
+    """Whether a sphere has enough points."""
+    return len(candidate.found.inliers) >= MIN_SPHERE_POINTS
 
 
-def sphere_fits_everywhere(t: Trial) -> bool:
-    """Every patch of a sphere is on it."""
+def sphere_fits_everywhere(candidate: Candidate) -> bool:
+    """Whether every patch of a sphere is on it."""
     share, more = MAX_SPHERE_MISFIT
-    return t.misfit < share * t.radius + more
+    return candidate.misfit < share * candidate.radius + more
 
 
-def is_round(t: Trial) -> bool:
-    """The mean section is a circle or an oval."""
-    return t.misfit < MAX_MISFIT * t.radius + MAX_NOISE_MISFIT * t.found.fit.sigma
+def section_is_round(candidate: Candidate) -> bool:
+    """Whether the mean section is a circle or an oval."""
+    return (
+        candidate.misfit
+        < MAX_MISFIT * candidate.radius + MAX_NOISE_MISFIT * candidate.found.fit.sigma
+    )
 
 
-def axis_is_covered(t: Trial) -> bool:
-    """Points lie along most of the axis."""
-    return t.found.extent.coverage >= MIN_COVERAGE / t.slack
+def axis_is_covered(candidate: Candidate) -> bool:
+    """Whether points lie along most of the axis."""
+    return candidate.found.extent.coverage >= MIN_COVERAGE / candidate.slack
 
 
-def arc_is_wide_enough(t: Trial) -> bool:
-    """Points lie around enough of the axis; less is enough for a straight known sharply."""
-    is_straight = isinstance(t.found.fit.model, LineSurface)
-    is_very_sharp = is_straight and t.relative_sd < VERY_SHARP_RADIUS_SD
-    return bool(t.arc >= (MIN_SHARP_ARC if is_very_sharp else MIN_ARC) / t.slack)
+def arc_is_wide_enough(candidate: Candidate) -> bool:
+    """Whether points lie around enough of the axis; less for a straight of precise radius."""
+    is_straight = isinstance(candidate.found.fit.model, LineSurface)
+    is_very_sharp = is_straight and candidate.relative_sd < VERY_SHARP_RADIUS_SD
+    return bool(candidate.arc >= (MIN_SHARP_ARC if is_very_sharp else MIN_ARC) / candidate.slack)
 
 
-def radius_is_precise_for_its_arc(t: Trial) -> bool:
-    """A short arc is believed only where the radius is known well."""
-    is_long = isinstance(t.found.fit.model, LineSurface) and t.lengths > LONG
-    return t.arc >= SURE_ARC or t.relative_sd < (LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD)
+def radius_is_precise_for_its_arc(candidate: Candidate) -> bool:
+    """Whether the radius is precise, where the arc is short."""
+    is_long = isinstance(candidate.found.fit.model, LineSurface) and candidate.lengths > LONG
+    return candidate.arc >= SURE_ARC or candidate.relative_sd < (
+        LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
+    )
 
 
-def surface_is_smooth(t: Trial) -> bool:
-    """The surface does not leave its shape all over; asked of finished fits only."""
-    if t.slack > 1.0:
+def surface_is_smooth(candidate: Candidate) -> bool:
+    """Whether a final fit leaves its shape in places only, not all over as cloth does."""
+    if candidate.slack > 1.0:
         return True
-    xyz = t.surface.xyz[t.found.inliers]
-    residual, _, _ = t.found.fit.model.residuals(xyz)
-    chainage, _, clock = t.found.axis.pipe_coordinates(xyz)
-    if t.found.section is not None:
-        residual = residual - t.found.section.height(chainage, clock)
-    wave = waviness(chainage, clock, residual, t.radius, t.arc)
-    return not wave > _allowed_waviness(t, *WAVINESS)
+    xyz = candidate.surface.xyz[candidate.found.inliers]
+    residual, _, _ = candidate.found.fit.model.residuals(xyz)
+    chainage, _, clock = candidate.found.axis.pipe_coordinates(xyz)
+    if candidate.found.section is not None:
+        residual = residual - candidate.found.section.height(chainage, clock)
+    wave = waviness(chainage, clock, residual, candidate.radius, candidate.arc)
+    return not wave > _allowed_waviness(candidate, *WAVINESS)
 
 
-def bend_arc_is_wide_enough(t: Trial) -> bool:
-    """A torus has more parameters to satisfy than a cylinder."""
-    return bool(t.arc >= MIN_BEND_ARC)
+def bend_arc_is_wide_enough(candidate: Candidate) -> bool:
+    """Whether a bend shows more arc than a cylinder must: it has more parameters."""
+    return bool(candidate.arc >= MIN_BEND_ARC)
 
 
-def bend_radius_is_well_determined(t: Trial) -> bool:
-    """The points carry the bend radius."""
-    model, sd = t.found.fit.model, np.sqrt(t.found.fit.covariance[5, 5]) / t.slack**2
+def bend_radius_is_well_determined(candidate: Candidate) -> bool:
+    """Whether the standard deviation of the bend radius is small enough."""
+    model, sd = (
+        candidate.found.fit.model,
+        np.sqrt(candidate.found.fit.covariance[5, 5]) / candidate.slack**2,
+    )
     return isinstance(model, ArcSurface) and bool(sd < MAX_BEND_RADIUS_SD * model.bend_radius)
 
 
-def bend_radius_exceeds_radius(t: Trial) -> bool:
-    """A bend turns about a point outside itself."""
-    model = t.found.fit.model
-    return isinstance(model, ArcSurface) and model.bend_radius > MIN_BEND_RADIUS * t.radius
+def bend_radius_exceeds_radius(candidate: Candidate) -> bool:
+    """Whether a bend turns about a point outside itself."""
+    model = candidate.found.fit.model
+    return isinstance(model, ArcSurface) and model.bend_radius > MIN_BEND_RADIUS * candidate.radius
 
 
-def bend_is_long_enough(t: Trial) -> bool:
-    """A bend has some length."""
-    return t.lengths > MIN_BEND_LENGTH
+def bend_is_long_enough(candidate: Candidate) -> bool:
+    """Whether a bend is longer than a chance fit."""
+    return candidate.lengths > MIN_BEND_LENGTH
 
 
-def cone_tapers_clearly(t: Trial) -> bool:
-    """A cone's radius changes clearly over some length."""
-    start, end = t.found.radii
-    return abs(end - start) > MIN_TAPER_CHANGE * t.radius and t.lengths > MIN_TAPER_LENGTH
+def cone_tapers_clearly(candidate: Candidate) -> bool:
+    """Whether a cone's radius changes clearly, over some length."""
+    start, end = candidate.found.radii
+    return (
+        abs(end - start) > MIN_TAPER_CHANGE * candidate.radius
+        and candidate.lengths > MIN_TAPER_LENGTH
+    )
 
 
-def cylinder_is_long_enough(t: Trial) -> bool:
-    """A cylinder is longer than a few points, and than a slice of a vessel's head."""
-    is_wide = t.radius > WIDE and t.arc < WHOLE_ARC
-    shortest = MIN_WIDE_LENGTH * t.radius if is_wide else 0.0
-    return t.found.axis.length > max(MIN_VOXELS * t.surface.voxel, shortest)
+def cylinder_is_long_enough(candidate: Candidate) -> bool:
+    """Whether a cylinder is longer than a few points, and than a slice of a vessel's head."""
+    is_wide = candidate.radius > WIDE and candidate.arc < WHOLE_ARC
+    shortest = MIN_WIDE_LENGTH * candidate.radius if is_wide else 0.0
+    return candidate.found.axis.length > max(MIN_VOXELS * candidate.surface.voxel, shortest)
 
 
-Gate = Callable[[Trial], bool]
+Gate = Callable[[Candidate], bool]
 
-OF_ALL: tuple[Gate, ...] = (radius_is_within_limits, scatter_is_low, radius_is_well_determined)
-OF_TUBES = (
-    *OF_ALL,
-    is_round,
+GATES_OF_ALL: tuple[Gate, ...] = (
+    radius_is_within_limits,
+    scatter_is_low,
+    radius_is_well_determined,
+)
+GATES_OF_TUBES = (
+    *GATES_OF_ALL,
+    section_is_round,
     axis_is_covered,
     arc_is_wide_enough,
     radius_is_precise_for_its_arc,
     surface_is_smooth,
 )
 GATES: dict[str, tuple[Gate, ...]] = {
-    "sphere": (*OF_ALL, has_enough_points, sphere_fits_everywhere),
+    "sphere": (*GATES_OF_ALL, has_enough_points, sphere_fits_everywhere),
     "bend": (
-        *OF_TUBES,
+        *GATES_OF_TUBES,
         bend_arc_is_wide_enough,
         bend_radius_is_well_determined,
         bend_radius_exceeds_radius,
         bend_is_long_enough,
     ),
-    "cone": (*OF_TUBES, cone_tapers_clearly),
-    "cylinder": (*OF_TUBES, cylinder_is_long_enough),
+    "cone": (*GATES_OF_TUBES, cone_tapers_clearly),
+    "cylinder": (*GATES_OF_TUBES, cylinder_is_long_enough),
 }
-"""What each shape must fulfil, in the order in which it is asked."""
+"""The gates of each shape, in the order in which they are evaluated."""
 
 
 def _shape(found: FittedElement) -> str:
@@ -234,7 +263,7 @@ def _shape(found: FittedElement) -> str:
 def failed_gate(
     found: FittedElement, surface: Surface, settings: ElementSettings, slack: float = 1.0
 ) -> str | None:
-    """Name of the first gate that a refined piece fails, or None.
+    """Name of the first gate that a fitted element fails, or None.
 
     Parameters
     ----------
@@ -243,11 +272,15 @@ def failed_gate(
         The downsampled points.
     settings : ElementSettings
     slack : float
-        Multiplies the limits of what a last round of fitting can mend.
+        At least 1; relaxes the limits of what a last round of fitting can improve.
+
+    Returns
+    -------
+    str or None
     """
-    trial = Trial(found, settings, surface, slack)
+    candidate = Candidate(found, settings, surface, slack)
     for gate in GATES[_shape(found)]:
-        if not gate(trial):
+        if not gate(candidate):
             return gate.__name__
     return None
 
@@ -255,5 +288,5 @@ def failed_gate(
 def passes_gates(
     found: FittedElement, surface: Surface, settings: ElementSettings, slack: float = 1.0
 ) -> bool:
-    """Whether a refined piece is a pipe element; see `failed_gate`."""
+    """Whether a fitted element passes all gates of its shape; see `failed_gate`."""
     return failed_gate(found, surface, settings, slack) is None

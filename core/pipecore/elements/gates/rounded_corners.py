@@ -17,9 +17,9 @@ Array = NDArray[np.float64]
 
 NEAREST, FURTHEST = np.deg2rad(17.0), np.deg2rad(38.0)
 """The part of a touching plane that is looked at: angles about the axis from where it touches."""
-CLEAR, LEAST_PART = 3.0, np.deg2rad(8.0)
+MIN_DISTANCE_NOISE, MIN_PART_ANGLE = 3.0, np.deg2rad(8.0)
 """It begins where it is so many times the noise off the cylinder, and is no smaller than this."""
-BEHIND = np.deg2rad(5.0), np.deg2rad(30.0)
+BESIDE = np.deg2rad(5.0), np.deg2rad(30.0)
 """The part of the arc that must be seen next to where a plane touches."""
 MAX_OFF = 0.03
 """It touches if it passes the axis at the radius, give or take this share of it and the noise."""
@@ -52,11 +52,11 @@ def touching_planes(found: FittedElement, nearby: NearbyPoints) -> tuple[float, 
 
     1 is a plane without holes; before and after are in the sense of increasing clock. A plane
     that touches the cylinder elsewhere, such as the floor below a pipe, does not count. Where
-    the noise does not let planes be told from the cylinder there are none.
+    planes cannot be distinguished from the cylinder for the noise there are none.
     """
     axis, radius, noise = found.axis, found.fit.model.radius, nearby.surface.noise
-    nearest = max(NEAREST, float(np.arccos(1.0 / (1.0 + CLEAR * noise / radius))))
-    if FURTHEST - nearest < LEAST_PART:
+    nearest = max(NEAREST, float(np.arccos(1.0 / (1.0 + MIN_DISTANCE_NOISE * noise / radius))))
+    if FURTHEST - nearest < MIN_PART_ANGLE:
         return 0.0, 0.0
     downsampled = nearby.around_axis(axis, radius, 0.0)
     chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[downsampled])
@@ -65,23 +65,23 @@ def touching_planes(found: FittedElement, nearby: NearbyPoints) -> tuple[float, 
     up, right = axis.frame(chainage)
     x, y = np.einsum("ij,ij->i", normals, up), np.einsum("ij,ij->i", normals, right)
     # Normals point either way: outward is where the point lies.
-    lean = np.mod(clock - np.arctan2(y, x) + np.pi / 2, np.pi) - np.pi / 2
+    angle = np.mod(clock - np.arctan2(y, x) + np.pi / 2, np.pi) - np.pi / 2
     tolerance = MAX_OFF * radius + 2.0 * noise
-    touches = (np.abs(rho * np.cos(lean) - radius) < tolerance) & (along < MAX_TILT)
-    _, _, own_clock = axis.pipe_coordinates(nearby.surface.xyz[found.inliers])
+    touches = (np.abs(rho * np.cos(angle) - radius) < tolerance) & (along < MAX_TILT)
+    _, _, inlier_clock = axis.pipe_coordinates(nearby.surface.xyz[found.inliers])
     density = axis.length / nearby.usual_spacing(found.inliers) ** 2
     width = radius * (np.tan(FURTHEST) - np.tan(nearest))
     shares = []
     for side in (-1.0, 1.0):
-        is_there = touches & (side * lean > nearest) & (side * lean < FURTHEST)
+        is_there = touches & (side * angle > nearest) & (side * angle < FURTHEST)
         share = float(is_there.sum()) / (width * density)
-        if abs(_turn(clock - lean, rho * np.sin(lean), is_there)) * width > MAX_TURN:
+        if abs(_turn(clock - angle, rho * np.sin(angle), is_there)) * width > MAX_TURN:
             share = 0.0  # a pipe close by has a tangent plane in common with this one
         # The arc that the plane goes on from lies on the other side of where it touches.
-        touch = np.exp(1j * (clock - lean)[is_there]).sum()
-        behind = side * np.angle(touch * np.exp(-1j * own_clock))
-        n_behind = np.sum((behind > BEHIND[0]) & (behind < BEHIND[1]))
-        is_seen = n_behind > 0.5 * (BEHIND[1] - BEHIND[0]) * radius * density
+        touch = np.exp(1j * (clock - angle)[is_there]).sum()
+        beside = side * np.angle(touch * np.exp(-1j * inlier_clock))
+        n_beside = np.sum((beside > BESIDE[0]) & (beside < BESIDE[1]))
+        is_seen = n_beside > 0.5 * (BESIDE[1] - BESIDE[0]) * radius * density
         shares.append(share if is_seen else 0.0)
     return shares[0], shares[1]
 

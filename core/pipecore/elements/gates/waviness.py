@@ -20,8 +20,8 @@ CELL_WIDTH, SECTORS = 0.03, (12, 24)
 MIN_IN_CELL, MIN_CELLS = 4, 12
 OVAL_ARC = np.deg2rad(200.0)
 """From this arc on an oval section can be told from a round one that is off centre."""
-SURE = 4.0
-"""Cells are wavy from so many standard deviations of their scatter's own chance on."""
+MIN_SIGNIFICANCE = 4.0
+"""Cells are wavy if their scatter exceeds that of noise by this many standard deviations."""
 N_STEPS = 8
 HALF_OF_SQUARES, VARIANCE_OF_MEDIAN = 0.4549, 5.4
 """Median of the square of a standard normal variable; variance, times n, of that of n in units
@@ -71,7 +71,7 @@ def waviness(chainage: Array, clock: Array, residual: Array, radius: float, arc:
     mean, expected = mean[used], noise / np.sqrt(n[used])
     left = least_distances(design, mean, expected, N_STEPS)
     scatter = np.median(np.square(left / expected)) / HALF_OF_SQUARES
-    if scatter < 1.0 + SURE * np.sqrt(VARIANCE_OF_MEDIAN / len(left)):
+    if scatter < 1.0 + MIN_SIGNIFICANCE * np.sqrt(VARIANCE_OF_MEDIAN / len(left)):
         return 0.0
     excess = np.median(np.square(left)) / HALF_OF_SQUARES - np.median(np.square(expected))
     return float(np.sqrt(max(excess, 0.0)))

@@ -28,11 +28,11 @@ REACH_OF_SPHERE = 1.2
 CELL_VOXELS, COARSE = 6.0, 4
 """Edge of the cells in which points are looked up, in voxels; of coarse cells, in fine ones."""
 
-FEW = 20_000
-"""A rough look takes a sample where more points than this are in the cells about a surface."""
+ROUGH_SAMPLE_POINTS = 20_000
+"""A rough search takes about this many of the points in the cells about a surface."""
 
-AT_ONCE, BEGUN = 2_000_000, 0.3
-"""Points put into cells between two words to the progress, and what it is told."""
+POINTS_PER_UPDATE, FRACTION_AT_START = 2_000_000, 0.3
+"""Points put into cells between two updates of the progress, and the fraction reported."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class NearbyPoints:
     cloud : PointCloud
     surface : Surface
     progress : Progress
-        Told now and then while the points are put into cells.
+        Updated now and then while the points are put into cells.
     allocate : callable
         Makes the arrays with a value for each downsampled point.
     """
@@ -113,10 +113,10 @@ class NearbyPoints:
         first, _, n_y, n_z = frame.numbers
         counter = VoxelCounter(frame)
         cell = allocate("cell_of_point", (len(surface.xyz),), np.int32)
-        for start in range(0, len(cell), AT_ONCE):
-            progress.update("elements", BEGUN)
-            counter.add(surface.xyz, start, min(start + AT_ONCE, len(cell)), cell)
-        progress.update("elements", BEGUN)
+        for start in range(0, len(cell), POINTS_PER_UPDATE):
+            progress.update("elements", FRACTION_AT_START)
+            counter.add(surface.xyz, start, min(start + POINTS_PER_UPDATE, len(cell)), cell)
+        progress.update("elements", FRACTION_AT_START)
         numbers = counter.keys
         place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
         coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
@@ -127,7 +127,7 @@ class NearbyPoints:
         middles = (first + place[order] + 0.5) * edge
         rank = np.empty(len(order), np.int32)
         rank[order] = np.arange(len(order), dtype=np.int32)
-        progress.update("elements", BEGUN)
+        progress.update("elements", FRACTION_AT_START)
         rename_voxels(cell, 0, len(cell), rank)
         points = allocate("points_of_cells", (len(cell),), np.int32)
         starts = group_into(cell, len(order), points)
@@ -185,7 +185,7 @@ class NearbyPoints:
             )
         own, columns, spacing = point_search.points_on_surface(
             points, self.surface.spacing, self.surface.voxel, self._grid, tube, shell, target,
-            FEW if is_rough else 0,
+            ROUGH_SAMPLE_POINTS if is_rough else 0,
         )  # fmt: skip
 
         def look_inside(begin: float, end: float) -> Array:
@@ -213,7 +213,7 @@ class NearbyPoints:
         outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
         inner = model.radius - band
         cells = cell_search.cells_in_shell(self._grid, model.centre, inner, outer)
-        stride = point_search.stride_of(self._grid, cells, FEW if is_rough else 0)
+        stride = point_search.stride_of(self._grid, cells, ROUGH_SAMPLE_POINTS if is_rough else 0)
         return np.asarray(
             point_search.points_on_sphere(
                 point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free),

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 MIN_POINTS = 5
-"""Rows of fewer points tell no level."""
+"""Rows of fewer points have no level."""
 MIN_BANDS = 3
 """What alternates less often may be a dent, a bow or a step of the pipe itself."""
 LONGEST_BAND = 0.5
@@ -50,20 +50,20 @@ def is_off_bands(chainage: Array, residual: Array, spacing: float, radius: float
     n = np.bincount(row)
     first = np.cumsum(n) - n
     level = np.full(len(n), np.nan)
-    is_told = n >= MIN_POINTS
-    level[is_told] = residual[order][(first + n // 2)[is_told]]
-    told = level[is_told]
-    if len(told) < 4 * MIN_BANDS:
+    has_level = n >= MIN_POINTS
+    level[has_level] = residual[order][(first + n // 2)[has_level]]
+    levels = level[has_level]
+    if len(levels) < 4 * MIN_BANDS:
         return None
-    low, high = _two_levels(told)
-    scatter = robust_sd((residual - level[row])[is_told[row]])
-    level_sd = 1.2533 * scatter / np.sqrt(np.median(n[is_told]))
+    low, high = _two_levels(levels)
+    scatter = robust_sd((residual - level[row])[has_level[row]])
+    level_sd = 1.2533 * scatter / np.sqrt(np.median(n[has_level]))
     is_own = level < low + NEAR_LEVEL * (high - low)
     is_band = level > low + 0.5 * (high - low)
     lengths = _run_lengths(is_band)
     is_banded = (
         high - low > SURE_GAP * level_sd
-        and is_own.sum() >= MIN_OWN * len(told)
+        and is_own.sum() >= MIN_OWN * len(levels)
         and len(lengths) >= MIN_BANDS
         and lengths.max() * step < LONGEST_BAND * radius
     )
