@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock wheels venv system-packages clean
+.PHONY: docs help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock wheels venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -22,11 +22,12 @@ demo: venv ## Find the deformations in the demo scan and look at them in the app
 
 test: lint test-core test-kernels test-gui ## Run every check and every test
 
-lint: venv ## Check style, types and the rules of who may import whom
+lint: venv ## Check style, types, docstrings and the rules of who may import whom
 	$(VENV)/bin/ruff check
 	$(VENV)/bin/ruff format --check
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports --no-logo --no-cache
+	$(PYTHON) -m tools.docstrings
 
 # Without the Qt plugin, so that the core is seen to do without Qt.
 test-core: venv
@@ -67,6 +68,9 @@ lock: ## Bring requirements.lock up to what both pyproject.toml ask for (needs u
 	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	    --no-emit-package pipegui-core --custom-compile-command "make lock" \
 	    --extra all --extra dev pyproject.toml -o requirements.lock
+
+docs: venv ## Build the API reference and the pages of docs into out/docs; a warning is an error
+	$(PYTHON) -m sphinx --fail-on-warning --keep-going --quiet --fresh-env docs out/docs
 
 wheels: venv ## Build the wheels of the library and of the app into dist
 	$(PYTHON) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist ./core .

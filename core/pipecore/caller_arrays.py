@@ -59,6 +59,16 @@ def check_coordinates(xyz: ArrayLike) -> NDArray[np.float64]:
 def check_positions(positions: ArrayLike) -> NDArray[np.float64]:
     """Return one position or several as float64, shape (k, 3).
 
+    Parameters
+    ----------
+    positions : array_like
+        World coordinates in metres, shape (3,) or (k, 3).
+
+    Returns
+    -------
+    ndarray
+        Shape (k, 3).
+
     Raises
     ------
     TypeError
@@ -93,6 +103,11 @@ def check_column(
     dtype : type
         An integer type takes whole numbers within its range only.
     n_components : int, optional
+
+    Returns
+    -------
+    ndarray
+        Of `dtype`, C-contiguous.
 
     Raises
     ------

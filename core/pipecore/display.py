@@ -5,7 +5,19 @@ from html import escape
 
 
 def html_table(rows: Iterable[Sequence[str]], header: Sequence[str] = (), caption: str = "") -> str:
-    """Return rows of text as an HTML table; a header and a caption stand where given."""
+    """Return rows of text as an HTML table; a header and a caption stand where given.
+
+    Parameters
+    ----------
+    rows : iterable of sequences of str
+        Escaped here.
+    header : sequence of str, optional
+    caption : str, optional
+
+    Returns
+    -------
+    str
+    """
     return "".join(_html_parts(rows, header, caption))
 
 

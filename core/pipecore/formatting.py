@@ -20,6 +20,10 @@ def format_measure(value: float, sd: float = math.nan, unit: str = "", *, decima
     unit : str
     decimals : int
         Digits after the point where there is no standard deviation.
+
+    Returns
+    -------
+    str
     """
     if not math.isfinite(value):
         return NOT_MEASURABLE
@@ -45,7 +49,18 @@ def _plain(value: float, decimals: int) -> str:
 
 
 def format_clock(clock: float) -> str:
-    """Return a clock angle in radians as h:mm; 0 is 12:00, half an hour later 12:30."""
+    """Return a clock angle in radians as h:mm; 0 is 12:00, half an hour later 12:30.
+
+    Parameters
+    ----------
+    clock : float
+        Radians; 0 is 12:00, clockwise looking along the chainage.
+
+    Returns
+    -------
+    str
+        "" for nan.
+    """
     if not math.isfinite(clock):
         return ""
     minutes = round(clock / (2 * math.pi) * 720) % 720
@@ -53,7 +68,19 @@ def format_clock(clock: float) -> str:
 
 
 def format_coordinate(value: float, decimals: int = 3) -> str:
-    """Return a coordinate for people, with thin spaces: "6 201 877.530"."""
+    """Return a coordinate for people, with thin spaces: "6 201 877.530".
+
+    Parameters
+    ----------
+    value : float
+        In the unit to be shown; nan gives "not measurable".
+    decimals : int
+        Digits after the point.
+
+    Returns
+    -------
+    str
+    """
     if not math.isfinite(value):
         return NOT_MEASURABLE
     text = f"{abs(value):,.{decimals}f}".replace(",", THIN_SPACE)
@@ -61,12 +88,35 @@ def format_coordinate(value: float, decimals: int = 3) -> str:
 
 
 def format_count(number: int, singular: str, plural: str = "") -> str:
-    """Return a count with its noun: "1 pipe", "23 pipes"."""
+    """Return a count with its noun: "1 pipe", "23 pipes".
+
+    Parameters
+    ----------
+    number : int
+    singular : str
+    plural : str, optional
+        By default the singular with an s.
+
+    Returns
+    -------
+    str
+    """
     return f"{number:,} {singular if number == 1 else plural or singular + 's'}"
 
 
 def cell(value: float, decimals: int) -> str:
-    """Return a number for a machine: plain decimals, "" for what is not measurable."""
+    """Return a number for a machine: plain decimals, "" for what is not measurable.
+
+    Parameters
+    ----------
+    value : float
+    decimals : int
+        Digits after the point.
+
+    Returns
+    -------
+    str
+    """
     if not math.isfinite(value):
         return ""
     text = f"{value:.{decimals}f}"
@@ -74,5 +124,15 @@ def cell(value: float, decimals: int) -> str:
 
 
 def text_cell(text: str) -> str:
-    """Return text that no spreadsheet takes for a formula."""
+    """Return text that no spreadsheet takes for a formula.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        With a quote before it if it would be a formula.
+    """
     return f"'{text}" if text[:1] in tuple("=+-@\t\r") else text

@@ -40,6 +40,11 @@ def to_local(
         World coordinates, metres, shape (n, 3).
     origin : ndarray
         World coordinates of the local zero, shape (3,).
+
+    Returns
+    -------
+    ndarray
+        Shape (n, 3), C-contiguous.
     """
     local = xyz - origin
     reach = np.abs(local).max(initial=0.0)

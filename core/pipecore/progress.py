@@ -1,30 +1,38 @@
-"""How long work tells its caller how far it is, and learns that it should stop."""
+"""Progress of long work: how far it is, and whether it should stop."""
 
 from collections.abc import Iterator
 from typing import Protocol
 
 
 class Progress(Protocol):
-    """Told by every stage how far it is; may stop the work by raising.
+    """What a caller implements to see how far work is, and to stop it.
 
     Stages call `update` at least twice a second. An implementation that wants the
     work to stop raises `pipecore.errors.CancelledError` from it.
     """
 
     def update(self, stage: str, fraction: float) -> None:
-        """Take note that `stage` (a short lower-case noun) is done to `fraction` (0 to 1)."""
+        """Show that `stage` (a short lower-case noun) is done to `fraction` (0 to 1)."""
         ...
 
 
 class NoProgress:
-    """The progress nobody looks at."""
+    """Progress that nobody looks at."""
 
     def update(self, stage: str, fraction: float) -> None:
         """Do nothing."""
 
 
 class Renamed:
-    """Tells another progress of work as part of one of its stages."""
+    """Progress of work that is part of a stage of other work.
+
+    Parameters
+    ----------
+    progress : Progress
+        Of the other work; it is given all updates.
+    stage : str
+        The stage that it is given with them.
+    """
 
     def __init__(self, progress: Progress, stage: str) -> None:
         self._progress, self._stage = progress, stage
@@ -37,7 +45,17 @@ class Renamed:
 def in_chunks(
     n_items: int, chunk_size: int, stage: str, progress: Progress
 ) -> Iterator[tuple[int, int]]:
-    """Yield (start, stop) over `n_items`, reporting to `progress` around every chunk."""
+    """Yield (start, stop) over `n_items`, reporting to `progress` around every chunk.
+
+    Parameters
+    ----------
+    n_items : int
+    chunk_size : int
+    stage : str
+        What `progress` is told.
+    progress : Progress
+        May stop the work by raising.
+    """
     for start in range(0, n_items, chunk_size):
         progress.update(stage, start / n_items)
         yield start, min(start + chunk_size, n_items)

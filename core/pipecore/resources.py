@@ -7,6 +7,16 @@ _IN_SOURCES = Path(__file__).parents[2] / "resources"
 
 
 def resource(*parts: str) -> Path:
-    """Path of a file or folder in ``resources/``."""
+    """Path of a file or folder in ``resources/``.
+
+    Parameters
+    ----------
+    *parts : str
+        Names of folders and the file, below ``resources/``.
+
+    Returns
+    -------
+    Path
+    """
     root = _IN_WHEEL if _IN_WHEEL.is_dir() else _IN_SOURCES
     return root.joinpath(*parts)

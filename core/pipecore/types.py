@@ -163,6 +163,20 @@ class Stack:
     Profile `i` holds the points whose distance along `direction` from the local zero
     lies in [offset + i·width, offset + (i + 1)·width). Only points that are at least
     `min_spacing` from their neighbours join: wide profiles are for thinly scanned places.
+
+    Parameters
+    ----------
+    stack_id : int
+        From 1; 0 is `OWN_STACK`.
+    direction : ndarray
+        Unit vector, shape (3,).
+    width : float
+        Thickness of a profile, metres.
+    offset : float
+        Distance of profile 0 from the local zero, metres.
+    name : str
+    min_spacing : float
+        Metres.
     """
 
     stack_id: int
@@ -192,7 +206,15 @@ class ElementKind(StrEnum):
 
 @dataclass(frozen=True)
 class NominalSize:
-    """A catalogue size: its name (such as "DN 150 / NPS 6") and outside diameter in metres."""
+    """A catalogue size: its name (such as "DN 150 / NPS 6") and outside diameter in metres.
+
+    Parameters
+    ----------
+    name : str
+        Such as "DN 150 / NPS 6".
+    outside_diameter : float
+        Metres.
+    """
 
     name: str
     outside_diameter: float
@@ -457,9 +479,6 @@ class Deformation(Summarised):
         Magnitude (outward for a bulge) against the undented contour, metres.
     length, width : float
         Extent along the axis and around the circumference, metres.
-    area, volume : float
-        Of a dent or bulge: what it covers of the undented surface (m²), and what lies
-        between the two surfaces (m³); nan for the other kinds.
     ovality, strain : float
         As ratios; nan where they do not apply or cannot be measured.
     n_points : int
@@ -468,6 +487,9 @@ class Deformation(Summarised):
     verdict : Verdict
     significance : float
         Depth in units of its own noise.
+    area, volume : float
+        Of a dent or bulge: what it covers of the undented surface (m²), and what lies
+        between the two surfaces (m³); nan for the other kinds.
     fitting_id : int
         The nearest flange, bend or other fitting of the run, `NO_ID` if it has none; the
         own element's id if the deformation lies on a fitting.
@@ -537,7 +559,13 @@ class ReviewState(StrEnum):
 
 @dataclass(frozen=True)
 class Review:
-    """A person's word on a deformation, beside the rule's verdict."""
+    """A person's word on a deformation, beside the rule's verdict.
+
+    Parameters
+    ----------
+    state : ReviewState
+    comment : str
+    """
 
     state: ReviewState = ReviewState.OPEN
     comment: str = ""

@@ -120,6 +120,21 @@ def write_deformation_mesh(
     """Write the surfaces around deformations (all if None) as a mesh, .ply or .obj.
 
     Deviations are exaggerated as the settings say. Errors as for `write_report`.
+
+    Parameters
+    ----------
+    path : path
+        Ends in ``.ply`` or ``.obj``.
+    cloud : PointCloud
+        The cloud that `result` was detected in.
+    result : Result
+    deformation_ids : sequence of int, optional
+        All if None.
+
+    Raises
+    ------
+    WriteError
+        If the ending is neither, or the file cannot be written.
     """
     from pipecore.deformation import mesh_deformations  # noqa: PLC0415 - compiled kernels
     from pipecore.report.meshes import write_meshes  # noqa: PLC0415
@@ -132,7 +147,22 @@ def write_deformation_mesh(
 def write_element_mesh(
     path: str | os.PathLike[str], cloud: PointCloud, result: Result, element_ids: Sequence[int]
 ) -> None:
-    """Write the surfaces of whole elements as a mesh; see `write_deformation_mesh`."""
+    """Write the surfaces of whole elements as a mesh; see `write_deformation_mesh`.
+
+    Parameters
+    ----------
+    path : path
+        Ends in ``.ply`` or ``.obj``.
+    cloud : PointCloud
+        The cloud that `result` was detected in.
+    result : Result
+    element_ids : sequence of int
+
+    Raises
+    ------
+    WriteError
+        If the ending is neither, or the file cannot be written.
+    """
     from pipecore.deformation import mesh_elements  # noqa: PLC0415
     from pipecore.report.meshes import write_meshes  # noqa: PLC0415
 
@@ -147,7 +177,26 @@ def write_html(
     result: Result,
     progress: Progress | None = None,
 ) -> None:
-    """Write the report as one HTML page; errors as for `write_report`."""
+    """Write the report as one HTML page; errors as for `write_report`.
+
+    Parameters
+    ----------
+    path : path
+    cloud : PointCloud
+        The cloud that `result` was detected in.
+    result : Result
+    progress : Progress, optional
+        May cancel; then nothing was written.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written; what stood there before still does.
+    SettingsError
+        If the settings' acceptance rule is no longer there.
+    CancelledError
+        From `progress`.
+    """
     progress = progress or NoProgress()
     progress.update("drawing figures", 0.0)  # importing what draws them takes a while
     from pipecore.report.html import render_html  # noqa: PLC0415
@@ -166,6 +215,22 @@ def write_segments(
     """Write the cloud as LAZ with segment_id, element_id and deviation_mm of each point.
 
     Ids are 0 and deviations nan for points of none. Errors as for `write_report`.
+
+    Parameters
+    ----------
+    path : path
+    cloud : PointCloud
+        The cloud that `result` was detected in.
+    result : Result
+    progress : Progress, optional
+        May cancel; then nothing was written.
+
+    Raises
+    ------
+    WriteError
+        If the file cannot be written; what stood there before still does.
+    CancelledError
+        From `progress`.
     """
     write_laz(
         path,

@@ -92,7 +92,18 @@ def load(folder: str | os.PathLike[str], *, progress: Progress | None = None) ->
 
 
 def check_format(plain: Any) -> None:
-    """Raise `ValueError` unless a JSON value is a result of a version that is known here."""
+    """Raise `ValueError` unless a JSON value is a result of a version that is known here.
+
+    Parameters
+    ----------
+    plain : Any
+        As JSON gives it.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
     if not isinstance(plain, dict) or plain.get("format") != FORMAT:
         raise ValueError("result.json holds no result of pipecore")
     if plain.get("format_version") != FORMAT_VERSION:
@@ -110,6 +121,10 @@ def result_from_dict(plain: Mapping[str, Any]) -> Result:
     plain : mapping
         Keys that are not known are left out, and those that are not there keep their
         defaults, so that a report of another program of the same format can be read.
+
+    Returns
+    -------
+    Result
 
     Raises
     ------

@@ -33,7 +33,16 @@ DECIMALS = 9
 
 
 def result_to_dict(result: Result) -> dict[str, Any]:
-    """Return a result as plain dicts, lists, strings and numbers, ready for JSON."""
+    """Return a result as plain dicts, lists, strings and numbers, ready for JSON.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    dict
+    """
     plain = _plain(_content(result))
     assert isinstance(plain, dict)
     return plain

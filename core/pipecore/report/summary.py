@@ -9,7 +9,16 @@ VERDICT_ORDER = (Verdict.REJECT, Verdict.REVIEW, Verdict.NOT_MEASURABLE, Verdict
 
 
 def summarise(result: Result) -> str:
-    """Return a line such as "23 pipes in 7 runs, 5 deformations, 2 to reject"."""
+    """Return a line such as "23 pipes in 7 runs, 5 deformations, 2 to reject".
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    str
+    """
     if not result.elements:
         return "No pipes found"
     n_pipes = sum(e.kind is ElementKind.CYLINDER for e in result.elements)
@@ -28,7 +37,16 @@ def summarise(result: Result) -> str:
 
 
 def by_verdict(result: Result) -> list[Deformation]:
-    """Return the deformations, the worst verdict first, the deepest first within it."""
+    """Return the deformations, the worst verdict first, the deepest first within it.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    list of Deformation
+    """
     # A nan depth sorts last: it compares as minus infinity would.
     return sorted(
         result.deformations,

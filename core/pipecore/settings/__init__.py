@@ -62,6 +62,17 @@ class Settings(Summarised):
     >>> Settings(stacks=StackSettings(width_mm=15), elements=ElementSettings(min_radius_mm=30))
     >>> Settings().replace({"stacks.width_mm": 15, "elements.min_radius_mm": 30})
 
+    Parameters
+    ----------
+    input : InputSettings
+    thinning : ThinningSettings
+    stacks : StackSettings
+    profiles : ProfileSettings
+    ellipses : EllipseSettings
+    elements : ElementSettings
+    deformation : DeformationSettings
+    tiling : TilingSettings
+
     Raises
     ------
     SettingsError

@@ -52,9 +52,37 @@ def setting(
     )
 
 
+def _describe(declared: dataclasses.Field[Any]) -> str:
+    """The help of a setting, with its unit and what 0 means."""
+    of = declared.metadata
+    notes = [of["unit"]] if of["unit"] else []
+    notes += [f"0: {of['zero_means']}"] if of["zero_means"] else []
+    return str(of["help"]) + (f" ({'; '.join(notes)})" if notes else "")
+
+
 @dataclass(frozen=True)
 class FieldSpec:
-    """What a form or a flag needs to know of one setting."""
+    """What a form or a flag needs to know of one setting.
+
+    Parameters
+    ----------
+    group, name : str
+        Its dotted key is made of the two.
+    kind : type
+    default : Any
+    label : str
+        What a form calls it.
+    help : str
+        One sentence for its tooltip and its flag.
+    unit : str
+        Shown beside the value; "" if it has none.
+    minimum, maximum : float or None
+        Inclusive bounds.
+    zero_means : str
+        What 0 stands for, such as "automatic"; "" if it is a plain number.
+    advanced : bool
+        Whether a form folds it away.
+    """
 
     group: str
     name: str
@@ -86,8 +114,14 @@ class Group:
     name_in_settings: ClassVar[str]
 
     def __init_subclass__(cls, *, name: str) -> None:
-        """Take the name that the group has in `Settings`."""
+        """Take the name of the group in `Settings`; document its parameters by their help."""
         cls.name_in_settings = name
+        entries = [
+            f"{key} : {kind if isinstance(kind, str) else kind.__name__}\n    {_describe(value)}"
+            for key, kind in cls.__annotations__.items()
+            if isinstance(value := cls.__dict__.get(key), dataclasses.Field)
+        ]
+        cls.__doc__ = f"{cls.__doc__}\n\nParameters\n----------\n" + "\n".join(entries) + "\n"
 
     def __post_init__(self) -> None:
         """Bring every value to its type, and check it."""

@@ -31,6 +31,15 @@ __all__ = [
 def find_scene(name: str) -> Scene:
     """Return the scene called "demo" or "random:SEED", or that of a TOML file.
 
+    Parameters
+    ----------
+    name : str
+        "demo", "random:SEED", or the path of a TOML file.
+
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError

@@ -73,6 +73,10 @@ def random_pipe(
     scanner : Scanner, optional
         All other properties of the scanner.
 
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError

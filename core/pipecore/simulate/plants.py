@@ -42,6 +42,10 @@ def random_scene(
     scanner : Scanner, optional
         All other properties of the scanner.
 
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError

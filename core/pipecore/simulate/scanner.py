@@ -64,10 +64,23 @@ class _Points:
 def scan(scene: Scene, *, progress: Progress | None = None) -> Scan:
     """Scan `scene` from all its stations. The same scene gives the same scan.
 
+    Parameters
+    ----------
+    scene : Scene
+    progress : Progress, optional
+        May cancel.
+
+    Returns
+    -------
+    Scan
+        The cloud, with the element and the station of each point, and the truth.
+
     Raises
     ------
     SceneError
         If the scene cannot be built, or nothing in it is seen.
+    CancelledError
+        From `progress`.
     """
     progress = progress or NoProgress()
     placement = place_runs(scene)

@@ -302,7 +302,26 @@ class Scanner:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that a simulated scan depends on."""
+    """Everything that a simulated scan depends on.
+
+    Parameters
+    ----------
+    runs : tuple of Run
+        The pipes.
+    stations : tuple of (float, float, float)
+        Scanner positions in local coordinates, metres.
+    clutter : tuple of Clutter
+        What else stands there.
+    scanner : Scanner
+        Spacing, noise and errors of the scanner.
+    origin : (float, float, float)
+        World coordinates of the local zero, metres.
+    crs : str
+        Name of the coordinate reference system, or "".
+    seed : int
+        Of the scan's errors.
+    name : str
+    """
 
     runs: tuple[Run, ...]
     stations: tuple[Vector, ...]

@@ -20,6 +20,14 @@ from pipecore.simulate.scene import Scene
 def load_scene(path: Path) -> Scene:
     """Read a scene from a TOML file.
 
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError
@@ -40,7 +48,13 @@ def load_scene(path: Path) -> Scene:
 
 
 def save_scene(scene: Scene, path: Path) -> None:
-    """Write a scene as a TOML file that `load_scene` reads back equal."""
+    """Write a scene as a TOML file that `load_scene` reads back equal.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : Path
+    """
     path.write_text(tomli_w.dumps(_to_plain(scene)), encoding="utf-8")
 
 

@@ -92,6 +92,31 @@ class TrueDeformation:
     `length` and `width` are the whole footprint's. `shape` is a `DentShape`, or "".
     `seen` is the share of its area that points fell on (of its axis that is visible, for a
     bow or kink), `n_points` their number.
+
+    Parameters
+    ----------
+    deformation_id, element_id : int
+    kind : DeformationKind
+    chainage, chainage_start, chainage_end : float
+        Of the peak and of the extent, metres from the element's start.
+    clock : float
+        Clock angle of the peak, radians.
+    peak : ndarray
+        The peak on the surface, local coordinates, shape (3,).
+    depth : float
+        Magnitude, metres.
+    length, width : float
+        Of the whole footprint, metres.
+    ovality : float
+        As a ratio; nan for other kinds.
+    angle : float
+        Of a kink, radians; nan for other kinds.
+    shape : str
+        A `DentShape`, or "".
+    seen : float
+        Share of its area that points fell on; for a bow or kink, of its axis that is visible.
+    n_points : int
+        Points on it.
     """
 
     deformation_id: int
@@ -114,7 +139,16 @@ class TrueDeformation:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """All that a scan should show. `origin` takes local coordinates to the world."""
+    """All that a scan should show. `origin` takes local coordinates to the world.
+
+    Parameters
+    ----------
+    origin : ndarray
+        World coordinates of the local zero, shape (3,).
+    elements : tuple of TrueElement
+        In the order of their ids, from 1.
+    deformations : tuple of TrueDeformation
+    """
 
     origin: Array
     elements: tuple[TrueElement, ...]
@@ -137,6 +171,14 @@ class Truth:
 
 def load_truth(path: Path) -> Truth:
     """Read what `Truth.save` wrote.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Truth
 
     Raises
     ------
