@@ -18,7 +18,7 @@ from pipegui.controllers.session import Session
 from pipegui.controllers.settings_files import SettingsFiles
 from pipegui.controllers.view_updates import ViewUpdates
 from pipegui.i18n.texts import LANGUAGES, tr
-from pipegui.model import commands, element_commands, view_commands
+from pipegui.model import commands, element_commands, selection_commands, view_commands
 from pipegui.model.document import Background, Tool
 from pipegui.style.theme import Appearance
 from pipegui.window.action_table import VIEW_OPTIONS
@@ -95,8 +95,8 @@ def handlers(
         "cancel": session.jobs.cancel,
         "add_stack": panels.open_stack_editor,
         "reset_settings": lambda: do(commands.reset_settings),
-        "next_deformation": lambda: do(commands.step_deformation, 1),
-        "previous_deformation": lambda: do(commands.step_deformation, -1),
+        "next_deformation": lambda: do(selection_commands.step_deformation, 1),
+        "previous_deformation": lambda: do(selection_commands.step_deformation, -1),
         "isolate": lambda: do(commands.isolate),
         "show_all": lambda: do(commands.show_all),
         "export_report": exports.export_report,
@@ -161,7 +161,7 @@ def connect_panels(window: MainWindow, session: Session, controllers: Controller
         lambda kind, position: show_context_menu(window, window.actions_, kind, position)
     )
     panels.tree.visibility_changed.connect(lambda ids, hide: do(commands.set_hidden, ids, hide))
-    panels.table.chosen.connect(lambda i: do(commands.select_deformation, i))
+    panels.table.chosen.connect(lambda i: do(selection_commands.select_deformation, i))
     panels.table.reviewed.connect(lambda ids, state: do(commands.set_review, ids, state))
     panels.table.commented.connect(lambda i, text: do(commands.set_comment, i, text))
     panels.settings.changed.connect(lambda k, v: do(commands.change_settings, {k: v}))
@@ -196,18 +196,20 @@ def connect_views(window: MainWindow, session: Session, controllers: Controllers
     views.scene.picked.connect(clicks.click_point)
     views.scene.clip_dragged.connect(lambda box: do(view_commands.set_clip_box, box))
     views.scene.measurement_closed.connect(lambda i: do(view_commands.delete_measurement, i))
-    views.scene.deformation_picked.connect(lambda i: do(commands.select_deformation, i))
+    views.scene.deformation_picked.connect(lambda i: do(selection_commands.select_deformation, i))
     views.scene.hovered.connect(hovering.hover_point)
-    views.radius_plot.profile_clicked.connect(lambda s, i: do(commands.select_profile, s, i))
+    views.radius_plot.profile_clicked.connect(
+        lambda s, i: do(selection_commands.select_profile, s, i)
+    )
     views.radius_plot.profile_hovered.connect(hovering.hover_profile)
     views.radius_plot.stack_chosen.connect(lambda i: do(commands.show_plot_stack, i))
     views.radius_plot.pin_toggled.connect(lambda: do(commands.toggle_pin))
     views.radius_plot.pins_cleared.connect(lambda: do(commands.set_view, pinned_elements=()))
     views.section.spot_hovered.connect(hovering.hover_spot)
-    views.section.step_requested.connect(lambda by: do(commands.step_profile, by))
-    views.map.spot_clicked.connect(lambda s, clock: do(commands.select_spot, s, clock))
+    views.section.step_requested.connect(lambda by: do(selection_commands.step_profile, by))
+    views.map.spot_clicked.connect(lambda s, clock: do(selection_commands.select_spot, s, clock))
     views.map.spot_hovered.connect(hovering.hover_spot)
-    views.map.deformation_clicked.connect(lambda i: do(commands.select_deformation, i))
+    views.map.deformation_clicked.connect(lambda i: do(selection_commands.select_deformation, i))
     for plot in (views.radius_plot, views.section, views.map, views.preview):
         plot.save_requested.connect(
             lambda ending, plot=plot: controllers.exports.save_plot(plot, ending)

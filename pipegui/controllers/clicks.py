@@ -5,15 +5,15 @@ from PySide6.QtGui import QGuiApplication
 
 from pipegui.controllers.session import Session
 from pipegui.i18n.texts import tr
-from pipegui.model import commands, view_commands
+from pipegui.model import commands, selection_commands, view_commands
 from pipegui.model.document import Selection, Tool
 from pipegui.panels.project_tree import NodeKind
 from pipegui.states import descriptions
 
 COMMANDS = {
-    NodeKind.RUN: commands.select_run,
-    NodeKind.ELEMENT: commands.select_element,
-    NodeKind.DEFORMATION: commands.select_deformation,
+    NodeKind.RUN: selection_commands.select_run,
+    NodeKind.ELEMENT: selection_commands.select_element,
+    NodeKind.DEFORMATION: selection_commands.select_deformation,
 }
 
 
@@ -49,4 +49,4 @@ class Clicks(QObject):
         if kind in COMMANDS:
             session.do(COMMANDS[kind], item_id)
         elif kind is NodeKind.SCAN:
-            session.do(commands.select, Selection())
+            session.do(selection_commands.select, Selection())

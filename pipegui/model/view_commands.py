@@ -8,8 +8,9 @@ from pipecore.geometry import Array, surface_points
 from pipecore.types import Element, PointCloud
 from pipegui.model import result_queries
 from pipegui.model.cache import cached_with_owner
-from pipegui.model.commands import select_parent, select_point, set_view
+from pipegui.model.commands import set_view
 from pipegui.model.document import Box, ColourBy, Document, Limits, Measurement, Point, Tool
+from pipegui.model.selection_commands import select_parent, select_point
 
 POINT_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)
 N_SAMPLED = 200_000

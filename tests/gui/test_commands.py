@@ -9,7 +9,7 @@ from pipecore.errors import SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, Review, ReviewState, Verdict
-from pipegui.model import commands
+from pipegui.model import commands, selection_commands
 from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
 from pipegui.model.history import History
 from pipegui.model.selection import nearest_profile, selection_of_deformation, worst_deformation
@@ -65,13 +65,15 @@ def test_that_a_result_of_a_closed_scan_changes_nothing():
 
 @pytest.mark.parametrize("element_id", [e.element_id for e in RESULT.elements])
 def test_that_the_selected_element_is_kept_when_detected_again(element_id):
-    document = commands.select_element(DETECTED, element_id)
+    document = selection_commands.select_element(DETECTED, element_id)
     again = commands.set_result(document, CLOUD, shuffled_result())
     assert again.selection.element_id == len(RESULT.elements) + 1 - element_id
 
 
 def test_that_the_selected_profile_is_kept_in_its_place_when_detected_again():
-    document = commands.select_profile(commands.select_element(DETECTED, 7), 0, 30)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 7), 0, 30
+    )
     again = commands.set_result(document, CLOUD, shuffled_result())
     before = RESULT.profiles.of_element(7, 0).centre[30]
     kept = again.selection
@@ -81,7 +83,7 @@ def test_that_the_selected_profile_is_kept_in_its_place_when_detected_again():
 
 
 def test_that_a_selection_is_let_go_when_its_element_is_no_longer_found():
-    document = commands.select_element(DETECTED, 9)
+    document = selection_commands.select_element(DETECTED, 9)
     fewer = replace(
         RESULT,
         elements=RESULT.elements[:8],
@@ -92,48 +94,54 @@ def test_that_a_selection_is_let_go_when_its_element_is_no_longer_found():
 
 
 def test_that_escape_goes_up_to_nothing():
-    document = commands.select_profile(commands.select_deformation(DETECTED, 1), 0, 3)
+    document = selection_commands.select_profile(
+        selection_commands.select_deformation(DETECTED, 1), 0, 3
+    )
     seen = []
     for _ in range(4):
-        document = commands.select_parent(document)
+        document = selection_commands.select_parent(document)
         seen.append(document.selection)
     assert seen == [Selection(1, 2, 1), Selection(1, 2), Selection(1), Selection()]
 
 
 @pytest.mark.parametrize("index", [0, 123, 19_999])
 def test_that_a_picked_point_selects_its_element(index):
-    document = commands.select_point(DETECTED, index)
+    document = selection_commands.select_point(DETECTED, index)
     assert document.selection.element_id == RESULT.element_id[index]
 
 
 def test_that_a_pick_beside_everything_selects_nothing():
-    document = commands.select_element(DETECTED, 3)
-    assert commands.select_point(document, -1).selection == Selection()
+    document = selection_commands.select_element(DETECTED, 3)
+    assert selection_commands.select_point(document, -1).selection == Selection()
     floor = int(np.flatnonzero(RESULT.element_id == 0)[0])
-    assert commands.select_point(document, floor).selection == Selection()
+    assert selection_commands.select_point(document, floor).selection == Selection()
 
 
 def test_that_a_spot_on_the_map_selects_the_dent_there_or_the_profile_beside_it():
-    document = commands.select_element(DETECTED, 2)
+    document = selection_commands.select_element(DETECTED, 2)
     dent = RESULT.deformation(1)
-    inside = commands.select_spot(document, dent.chainage + 0.02, dent.clock - 0.1)
+    inside = selection_commands.select_spot(document, dent.chainage + 0.02, dent.clock - 0.1)
     assert inside.selection.deformation_id == 1
-    opposite = commands.select_spot(document, dent.chainage, dent.clock + np.pi)
+    opposite = selection_commands.select_spot(document, dent.chainage, dent.clock + np.pi)
     assert opposite.selection.deformation_id == 0
     assert opposite.selection.profile == nearest_profile(RESULT, 2, dent.chainage)
 
 
 def test_that_stepping_through_profiles_stops_at_the_ends():
-    document = commands.select_profile(commands.select_element(DETECTED, 2), 0, 0)
-    assert commands.step_profile(document, -1).selection.profile == ProfileKey(0, 0)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 2), 0, 0
+    )
+    assert selection_commands.step_profile(document, -1).selection.profile == ProfileKey(0, 0)
     for _ in range(1000):
-        document = commands.step_profile(document, 1)
+        document = selection_commands.step_profile(document, 1)
     last = RESULT.profiles.of_element(2, 0).profile_index[-1]
     assert document.selection.profile == ProfileKey(0, last)
 
 
 def test_that_stepping_from_a_dent_begins_at_its_peak():
-    document = commands.step_profile(commands.select_deformation(DETECTED, 1), 1)
+    document = selection_commands.step_profile(
+        selection_commands.select_deformation(DETECTED, 1), 1
+    )
     rows = RESULT.profiles.of_element(2, 0)
     row = rows.profile_index == document.selection.profile.profile_index
     assert 0 < rows.chainage[row][0] - RESULT.deformation(1).chainage < 0.03
@@ -143,14 +151,14 @@ def test_that_stepping_from_a_dent_begins_at_its_peak():
 def test_that_deformations_are_stepped_through_by_verdict_and_round_again():
     document, seen = DETECTED, []
     for _ in range(5):
-        document = commands.step_deformation(document, 1)
+        document = selection_commands.step_deformation(document, 1)
         seen.append(document.selection.deformation_id)
     assert seen[0] == seen[4] == 1
     assert sorted(seen[:4]) == [1, 2, 3, 4]
 
 
 def test_that_isolating_a_run_hides_everything_else():
-    document = commands.isolate(commands.select_run(DETECTED, 3))
+    document = commands.isolate(selection_commands.select_run(DETECTED, 3))
     assert document.view.hidden_elements == {1, 2, 3, 4, 5, 6, 7}
     assert commands.show_all(document).view.hidden_elements == frozenset()
 
@@ -176,7 +184,7 @@ def test_that_own_stacks_are_added_edited_and_removed_and_survive_a_reset():
 def test_that_undo_takes_back_work_but_not_where_one_looks():
     history = History(DETECTED)
     history.do(commands.change_settings, {"elements.min_radius_mm": 40.0})
-    history.do(commands.select_deformation, 1)
+    history.do(selection_commands.select_deformation, 1)
     history.do(commands.set_view, show_axes=False)
     assert history.undo_text == "Change settings"
     history.undo()
@@ -190,10 +198,10 @@ def test_that_undo_takes_back_work_but_not_where_one_looks():
 def test_that_looking_around_is_no_step():
     history = History(DETECTED)
     for command, argument in (
-        (commands.select_element, 2),
+        (selection_commands.select_element, 2),
         (commands.set_colour, ColourBy.KIND),
         (commands.show_stack, 1),
-        (commands.step_deformation, 1),
+        (selection_commands.step_deformation, 1),
     ):
         history.do(command, argument)
     assert history.undo_text == ""
@@ -221,7 +229,7 @@ def test_that_a_new_step_forgets_what_was_undone():
 
 def test_that_every_kind_of_deformation_keeps_its_element_selected():
     for deformation in RESULT.deformations:
-        document = commands.select_deformation(DETECTED, deformation.deformation_id)
+        document = selection_commands.select_deformation(DETECTED, deformation.deformation_id)
         assert document.selection.element_id == deformation.element_id
     assert {d.kind for d in RESULT.deformations} >= {DeformationKind.DENT, DeformationKind.BULGE}
 

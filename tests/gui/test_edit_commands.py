@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from pipecore.catalogues import sizes_of
 from pipecore.types import ReviewState
-from pipegui.model import commands, element_commands
+from pipegui.model import commands, element_commands, selection_commands
 from pipegui.model.document import Document, Scan, Selection
 from pipegui.model.history import History
 from pipegui.project.project_file import work_of
@@ -51,7 +51,7 @@ def edits(draw):
         elif kind == "hide":
             history.do(commands.set_hidden, [one], number % 2 == 0)
         elif kind == "select":
-            history.do(commands.select_element, one)
+            history.do(selection_commands.select_element, one)
             history.do(element_commands.mark_elements, ids[: number % 4])
 
     return act
@@ -96,11 +96,11 @@ def test_that_what_changes_nothing_is_no_step():
 
 
 def test_that_several_elements_are_a_selection_until_another_is_selected():
-    document = commands.select_element(START, 7)
+    document = selection_commands.select_element(START, 7)
     document = element_commands.mark_elements(document, [7, 9, 0])
     assert document.selection == Selection(2, 7, others=frozenset({9}))
-    assert commands.select_parent(document).selection == Selection(2, 7)
-    assert commands.select_element(document, 2).selection.others == frozenset()
+    assert selection_commands.select_parent(document).selection == Selection(2, 7)
+    assert selection_commands.select_element(document, 2).selection.others == frozenset()
     assert element_commands.mark_elements(START, [3]) is START
 
 

@@ -10,7 +10,7 @@ from PySide6.QtTest import QAbstractItemModelTester
 
 from pipecore.settings import DirectionPreset, Settings, iterate_fields
 from pipecore.types import DeformationKind, Verdict
-from pipegui.model import commands
+from pipegui.model import commands, selection_commands
 from pipegui.model.document import Document
 from pipegui.panels.deformation_columns import COLUMNS
 from pipegui.panels.deformation_model import DeformationFilter, DeformationModel
@@ -102,9 +102,9 @@ def test_that_the_tree_holds_runs_elements_and_deformations(qtbot, document):
 def test_that_a_run_of_one_element_is_shown_as_that_element(qtbot, document):
     model = ProjectModel()
     model.apply(resolve(document).tree)
-    run = model.index_of(0, commands.select_run(document, 2).selection)
+    run = model.index_of(0, selection_commands.select_run(document, 2).selection)
     assert model.what(run) == (0, NodeKind.ELEMENT, 7)
-    run = model.index_of(0, commands.select_run(document, 3).selection)
+    run = model.index_of(0, selection_commands.select_run(document, 3).selection)
     assert model.what(run) == (0, NodeKind.RUN, 3)
 
 
@@ -123,7 +123,7 @@ def test_that_a_run_is_half_checked_when_some_of_it_is_hidden(qtbot, document):
 def test_that_a_click_in_the_tree_tells_what_was_clicked(qtbot, document):
     tree = show(qtbot, ProjectTree())
     tree.apply(resolve(document).tree)
-    index = tree.model.index_of(0, commands.select_element(document, 4).selection)
+    index = tree.model.index_of(0, selection_commands.select_element(document, 4).selection)
     with qtbot.waitSignal(tree.chosen) as told:
         click_cell(qtbot, tree.view, index)
     assert told.args == [0, NodeKind.ELEMENT, 4]
@@ -131,7 +131,7 @@ def test_that_a_click_in_the_tree_tells_what_was_clicked(qtbot, document):
 
 def test_that_the_keys_walk_the_tree(qtbot, document):
     tree = show(qtbot, ProjectTree())
-    tree.apply(resolve(commands.select_element(document, 4)).tree)
+    tree.apply(resolve(selection_commands.select_element(document, 4)).tree)
     with qtbot.waitSignal(tree.chosen) as told:
         qtbot.keyClick(tree.view, Qt.Key.Key_Down)
     assert told.args == [0, NodeKind.ELEMENT, 5]
@@ -155,7 +155,7 @@ def test_that_showing_a_selection_is_not_told_as_a_choice(qtbot, document):
     told = []
     tree.chosen.connect(lambda *args: told.append(args))
     for element_id in (2, 9, 0):
-        tree.apply(resolve(commands.select_element(document, element_id)).tree)
+        tree.apply(resolve(selection_commands.select_element(document, element_id)).tree)
     assert told == []
     assert not tree.view.selectionModel().hasSelection()
 
@@ -253,14 +253,14 @@ def test_that_what_the_scan_cannot_carry_sorts_last(qtbot):
 
 def test_that_properties_carry_unit_and_uncertainty(qtbot, document):
     panel = show(qtbot, PropertiesPanel())
-    panel.apply(resolve(commands.select_element(document, 2)).properties)
+    panel.apply(resolve(selection_commands.select_element(document, 2)).properties)
     lines = {
         panel.list.topLevelItem(i).text(0): panel.list.topLevelItem(i)
         for i in range(panel.list.topLevelItemCount())
     }
     assert lines["Radius"].text(1) == "84.15 ± 0.04 mm"
     assert lines["Nominal size"].text(1) == "DN 150 / NPS 6 (OD 168.3 mm)"
-    panel.apply(resolve(commands.select_element(document, 9)).properties)
+    panel.apply(resolve(selection_commands.select_element(document, 9)).properties)
     ovality = panel.list.findItems("Ovality", Qt.MatchFlag.MatchExactly, 0)[0]
     assert ovality.text(1) == "not measurable"
     assert "140° of arc" in ovality.toolTip(1)
@@ -272,11 +272,11 @@ def test_that_properties_tell_with_what_an_element_was_detected_again(qtbot, doc
     result = replace(scan.result, own_settings={2: own})
     document = replace(document, scans=(replace(scan, result=result),))
     panel = show(qtbot, PropertiesPanel())
-    panel.apply(resolve(commands.select_element(document, 2)).properties)
+    panel.apply(resolve(selection_commands.select_element(document, 2)).properties)
     [line] = panel.list.findItems("Own settings", Qt.MatchFlag.MatchExactly, 0)
     before = f"{scan.result.settings.elements.min_radius_mm:g} mm"
     assert line.text(1) == f"Smallest radius: 12 mm ({before})"
-    panel.apply(resolve(commands.select_element(document, 7)).properties)
+    panel.apply(resolve(selection_commands.select_element(document, 7)).properties)
     assert not panel.list.findItems("Own settings", Qt.MatchFlag.MatchExactly, 0)
 
 

@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtWidgets import QApplication
 
-from pipegui.model import commands, result_queries
+from pipegui.model import commands, result_queries, selection_commands
 from pipegui.model.document import Document, ProfileKey, Scan, Selection
 from pipegui.plots.deviation_map_view import DeviationMapView
 from pipegui.plots.radius_plot import RadiusPlot
@@ -255,8 +255,10 @@ def test_that_page_and_end_keys_step_far(section, qtbot):
         with qtbot.waitSignal(section.step_requested) as asked:
             qtbot.keyClick(section, key)
         assert asked.args == [step]
-    document = commands.select_profile(commands.select_element(DETECTED, 2), 0, 5)
-    last = commands.step_profile(document, 10**6).selection.profile
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 2), 0, 5
+    )
+    last = selection_commands.step_profile(document, 10**6).selection.profile
     assert last.profile_index == RESULT.profiles.of_element(2, 0).profile_index[-1]
 
 
@@ -266,14 +268,14 @@ def test_that_page_and_end_keys_step_far(section, qtbot):
 def test_that_pinned_elements_stay_in_the_plot(qtbot):
     plot = shown(qtbot, RadiusPlot(), states(Selection(1, 2)).radius_plot)
     n_points = len(plot.numbers()["element"])
-    document = commands.toggle_pin(commands.select_element(DETECTED, 9))
-    document = commands.select_element(document, 2)
+    document = commands.toggle_pin(selection_commands.select_element(DETECTED, 9))
+    document = selection_commands.select_element(document, 2)
     plot.apply(resolve(document).radius_plot)
     assert set(plot.numbers()["element"]) == {"Pipe 2", "Pipe 9"}
     assert len(plot.numbers()["element"]) > n_points
     assert "Pipe&nbsp;9" in plot.key.text()
     assert not plot.pin.isChecked()
-    plot.apply(resolve(commands.select_element(document, 9)).radius_plot)
+    plot.apply(resolve(selection_commands.select_element(document, 9)).radius_plot)
     assert plot.pin.isChecked()
     assert set(plot.numbers()["element"]) == {"Pipe 9"}
 
@@ -286,7 +288,7 @@ def test_that_the_pin_asks_to_be_set(radius, qtbot):
 def test_that_the_seventh_pin_takes_the_first_one_off():
     document = DETECTED
     for element_id in range(1, 8):
-        document = commands.toggle_pin(commands.select_element(document, element_id))
+        document = commands.toggle_pin(selection_commands.select_element(document, element_id))
     assert document.view.pinned_elements == (2, 3, 4, 5, 6, 7)
     assert commands.toggle_pin(document).view.pinned_elements == (2, 3, 4, 5, 6)
 

@@ -7,7 +7,7 @@ import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
-from pipegui.model import view_commands
+from pipegui.model import selection_commands, view_commands
 from pipegui.model.document import Box, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene.measure_marks import lines_of
@@ -130,7 +130,9 @@ def test_that_the_line_follows_the_cursor_to_the_second_point(desk, qtbot):
 
 def test_that_escape_gives_up_the_point_then_the_tool_then_goes_up():
     document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),), view=STILL)
-    document = view_commands.select_point(document, int(np.flatnonzero(RESULT.element_id == 2)[0]))
+    document = selection_commands.select_point(
+        document, int(np.flatnonzero(RESULT.element_id == 2)[0])
+    )
     document = view_commands.choose_tool(document, Tool.MEASURE)
     document = view_commands.click_point(document, 5)
     document = view_commands.escape(document)
@@ -272,7 +274,7 @@ def test_that_a_box_around_everything_is_made_smaller_to_be_inverted():
     assert not inside.all()
     # What is selected is what is in the way.
     index = int(np.flatnonzero(RESULT.element_id == 7)[0])
-    chosen = view_commands.select_point(whole, index)
+    chosen = selection_commands.select_point(whole, index)
     around = view_commands.clip_to_selection(chosen).view.clip_box
     assert view_commands.invert_clip(chosen).view.clip_box == replace(around, is_inverted=True)
 
@@ -291,7 +293,9 @@ def test_that_the_box_can_hold_the_selection_or_the_scan():
     document = Document(scans=(Scan("plant.laz", CLOUD, RESULT),), view=STILL)
     whole = view_commands.switch_clip(document).view.clip_box
     assert np.array(whole.low) == pytest.approx(CLOUD.xyz.min(axis=0))
-    document = view_commands.select_point(document, int(np.flatnonzero(RESULT.element_id == 7)[0]))
+    document = selection_commands.select_point(
+        document, int(np.flatnonzero(RESULT.element_id == 7)[0])
+    )
     box = view_commands.clip_to_selection(document).view.clip_box
     points = CLOUD.xyz[RESULT.element_id == 7]
     assert (points >= box.low).all()

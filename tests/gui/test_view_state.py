@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipegui.model import commands
+from pipegui.model import commands, selection_commands
 from pipegui.model.document import Document, ProfileKey, Scan
 from pipegui.states.view_state import resolve
 from tests.factories import NOISE, make_scan
@@ -25,7 +25,9 @@ def changed_parts(before, after):
 
 
 def test_that_the_same_document_gives_equal_states():
-    document = commands.select_profile(commands.select_deformation(DETECTED, 1), 0, 40)
+    document = selection_commands.select_profile(
+        selection_commands.select_deformation(DETECTED, 1), 0, 40
+    )
     assert changed_parts(document, replace(document)) == set()
 
 
@@ -37,14 +39,18 @@ def test_that_a_setting_concerns_only_those_who_show_it():
 
 
 def test_that_stepping_to_the_next_profile_leaves_tables_and_map_points_alone():
-    before = commands.select_profile(commands.select_element(DETECTED, 2), 0, 40)
-    after = commands.step_profile(before, 1)
+    before = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 2), 0, 40
+    )
+    after = selection_commands.step_profile(before, 1)
     assert {"table", "settings", "stacks"}.isdisjoint(changed_parts(before, after))
     assert resolve(before).map.points is resolve(after).map.points
 
 
 def test_that_a_selected_profile_names_the_same_thing_to_all():
-    document = commands.select_profile(commands.select_element(DETECTED, 2), 0, 40)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 2), 0, 40
+    )
     state = resolve(document)
     assert state.radius_plot.selected_index == 40
     assert state.section.profile.profile_index[0] == 40
@@ -54,7 +60,7 @@ def test_that_a_selected_profile_names_the_same_thing_to_all():
 
 
 def test_that_a_selected_dent_shows_the_section_at_its_peak():
-    state = resolve(commands.select_deformation(DETECTED, 1))
+    state = resolve(selection_commands.select_deformation(DETECTED, 1))
     peak = RESULT.deformation(1).chainage
     assert state.section.profile.chainage[0] == pytest.approx(peak, abs=0.02)
     assert [d.deformation_id for d in state.section.deformations] == [1]
@@ -63,7 +69,9 @@ def test_that_a_selected_dent_shows_the_section_at_its_peak():
 
 def test_that_a_clean_section_lies_on_its_reference_circle_in_the_clock_frame():
     """Points at known clock angles come out where a clock face has them."""
-    document = commands.select_profile(commands.select_element(DETECTED, 7), 0, 10)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 7), 0, 10
+    )
     state = resolve(document).section
     relative = state.section.points_uv - state.section.reference.centre_uv
     radius = np.hypot(*relative.T)
@@ -83,7 +91,9 @@ def test_that_an_oblique_cut_of_a_round_pipe_lies_on_its_reference_ellipse():
     rows = RESULT.profiles.of_element(7, 1)
     clean = np.abs(rows.chainage - RESULT.deformation(3).chainage) > 0.2
     index = int(rows.profile_index[clean][5])
-    document = commands.select_profile(commands.select_element(DETECTED, 7), 1, index)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(DETECTED, 7), 1, index
+    )
     state = resolve(document).section
     reference = state.section.reference
     cos, sin = np.cos(reference.angle), np.sin(reference.angle)
@@ -98,15 +108,15 @@ def test_that_an_oblique_cut_of_a_round_pipe_lies_on_its_reference_ellipse():
 def test_that_a_bend_cut_twice_by_a_plane_shows_one_branch_only():
     rows = RESULT.profiles.of_element(3)
     for stack_id, index in zip(rows.stack_id, rows.profile_index, strict=True):
-        document = commands.select_element(DETECTED, 3)
-        document = commands.select_profile(document, int(stack_id), int(index))
+        document = selection_commands.select_element(DETECTED, 3)
+        document = selection_commands.select_profile(document, int(stack_id), int(index))
         state = resolve(document).section
         extent = np.hypot(*state.section.points_uv.T).max(initial=0)
         assert extent < 2.2 * RESULT.element(3).radius
 
 
 def test_that_the_plot_falls_back_to_a_stack_that_cuts_the_element():
-    document = commands.show_plot_stack(commands.select_element(DETECTED, 2), 3)
+    document = commands.show_plot_stack(selection_commands.select_element(DETECTED, 2), 3)
     assert 3 not in RESULT.profiles.of_element(2).stack_id
     state = resolve(document).radius_plot
     assert state.stack_id == 0
@@ -116,7 +126,9 @@ def test_that_the_plot_falls_back_to_a_stack_that_cuts_the_element():
 def test_that_nothing_is_kept_of_a_scan_that_was_closed():
     cloud, result = replace(CLOUD), replace(RESULT)
     document = Document(scans=(Scan("scan", cloud, result),))
-    document = commands.select_profile(commands.select_element(document, 2), 0, 40)
+    document = selection_commands.select_profile(
+        selection_commands.select_element(document, 2), 0, 40
+    )
     assert resolve(document).section.section is not None
     gone = weakref.ref(cloud), weakref.ref(result)
     del cloud, result, document
@@ -125,9 +137,9 @@ def test_that_nothing_is_kept_of_a_scan_that_was_closed():
 
 
 def test_that_a_profile_key_that_is_not_there_shows_an_empty_section():
-    document = commands.select_element(DETECTED, 2)
+    document = selection_commands.select_element(DETECTED, 2)
     selection = replace(document.selection, profile=ProfileKey(0, 9999))
-    state = resolve(commands.select(document, selection))
+    state = resolve(selection_commands.select(document, selection))
     assert state.section.profile is None
 
 

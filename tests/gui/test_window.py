@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog
 
 from pipecore.errors import CancelledError, ReadError
 from pipecore.types import NO_ID
+from pipegui.model import selection_commands
 from pipegui.model.document import Background, ColourBy, ProfileKey, Selection, Tool
 from pipegui.model.selection import selection_of_deformation
 from pipegui.panels.deformation_columns import INDEX
@@ -612,9 +613,7 @@ def test_that_the_plots_are_headed_by_what_they_show(detected):
 
 
 def test_that_the_profile_under_the_cursor_of_the_radius_plot_is_marked_in_3d(detected):
-    from pipegui.model import commands
-
-    detected.session.do(commands.select_element, 2)
+    detected.session.do(selection_commands.select_element, 2)
     parts = detected.window.views
     profiles = detected.session.document.result.profiles.of_element(2)
     key = ProfileKey(int(profiles.stack_id[5]), int(profiles.profile_index[5]))
@@ -625,9 +624,8 @@ def test_that_the_profile_under_the_cursor_of_the_radius_plot_is_marked_in_3d(de
 
 
 def test_that_the_cursor_on_the_map_is_marked_in_3d_and_the_other_way_round(detected):
-    from pipegui.model import commands
 
-    detected.session.do(commands.select_element, 2)
+    detected.session.do(selection_commands.select_element, 2)
     scan, parts = detected.session.document.scan, detected.window.views
     parts.map.spot_hovered.emit((0.8, 0.5))
     distance = scan.result.element(2).axis.pipe_coordinates(parts.scene.spot[None])
