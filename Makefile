@@ -12,7 +12,7 @@ endif
 
 MAKEFLAGS += --no-print-directory
 .DEFAULT_GOAL := help
-.PHONY: docs help demo test lint test-core test-kernels test-gui explore study bench pictures texts format lock wheels venv system-packages clean
+.PHONY: docs help demo test lint test-core test-kernels test-gui coverage explore study bench pictures texts format lock wheels venv system-packages clean
 
 help: ## Show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## (.*)/  make \1\t\2/' | expand -t 20
@@ -40,6 +40,16 @@ test-kernels: venv
 
 test-gui: venv
 	$(WINDOWED) $(PYTHON) -m pytest tests/gui
+
+# Compiled kernels are not seen: their lines count where the twins run them as plain Python.
+coverage: venv ## Measure which lines the tests run (writes out/coverage)
+	$(PYTHON) -m coverage erase
+	$(PYTHON) -m coverage run -p -m pytest -p no:pytest-qt tests/core
+	NUMBA_DISABLE_JIT=1 $(PYTHON) -m coverage run -p -m pytest -p no:pytest-qt -m kernels tests/core
+	$(WINDOWED) $(PYTHON) -m coverage run -p -m pytest tests/gui
+	$(PYTHON) -m coverage combine --quiet
+	$(PYTHON) -m coverage html --quiet
+	$(PYTHON) -m coverage report --skip-covered | tail -n 1
 
 # Tests that draw at random have one fixed seed in `make test`.
 HOURS ?= 1
