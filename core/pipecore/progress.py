@@ -17,7 +17,7 @@ class Progress(Protocol):
 
 
 class NoProgress:
-    """Progress that nobody looks at."""
+    """Progress that shows nothing and never stops the work."""
 
     def update(self, stage: str, fraction: float) -> None:
         """Do nothing."""
@@ -52,7 +52,7 @@ def in_chunks(
     n_items : int
     chunk_size : int
     stage : str
-        What `progress` is told.
+        Name of the stage in the updates of `progress`.
     progress : Progress
         May stop the work by raising.
     """

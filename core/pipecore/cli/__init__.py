@@ -23,7 +23,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Without the program's name; by default those of the process.
     """
-    _speak_utf8()
+    _replace_unencodable()
     args = make_parser().parse_args(arguments)
     with Console(is_quiet=args.quiet, shows_stages=args.shows_stages) as console:
         try:
@@ -47,8 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return DONE
 
 
-def _speak_utf8() -> None:
-    """Print “±” on consoles of other encodings too, if only as a question mark."""
+def _replace_unencodable() -> None:
+    """Let consoles of other encodings print “±” as a question mark instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

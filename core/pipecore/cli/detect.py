@@ -51,7 +51,7 @@ def run(args: argparse.Namespace, console: Console) -> None:
 
 
 def is_compiled() -> bool:
-    """Whether the kernels were compiled before; their store tells."""
+    """Return whether numba's cache holds compiled kernels."""
     stats = getattr(fit_planes, "stats", None)  # none where compiling is switched off
     return stats is None or any(Path(stats.cache_path).glob("neighbours.fit_planes-*.nbi"))
 

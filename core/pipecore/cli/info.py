@@ -12,7 +12,7 @@ from pipecore.formatting import format_count
 def run(args: argparse.Namespace, console: Console) -> None:
     """Say what is in a file."""
     info = io.info(args.file, progress=console)
-    # As many digits as the coordinates deserve: a tenth of a millimetre if they are metres.
+    # Four decimals: a tenth of a millimetre if the unit is metres.
     low, high = ("  ".join(f"{c:.4f}" for c in corner) for corner in (info.minimum, info.maximum))
     size = " × ".join(f"{c:.4g}" for c in info.maximum - info.minimum)
     lines = [

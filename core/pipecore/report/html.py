@@ -107,7 +107,7 @@ def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str
 
 
 def _own_settings(result: Result) -> Iterator[str]:
-    """With what elements were detected again whose settings differ from those of the others."""
+    """Elements that were detected again, with the settings in which they differ."""
     for settings in dict.fromkeys(result.own_settings.values()):
         own = (e for e in result.elements if result.settings_of(e.element_id) == settings)
         rows = (

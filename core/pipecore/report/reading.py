@@ -45,7 +45,7 @@ def load(folder: str | os.PathLike[str], *, progress: Progress | None = None) ->
         As `write_report`, `Result.save` or ``pipecore detect`` made it; needed are
         ``result.json`` and, for what belongs to each point, ``segments.laz``.
     progress : Progress, optional
-        Told about the stage "reading"; may cancel.
+        Receives updates of the stage "reading"; may cancel.
 
     Returns
     -------

@@ -282,7 +282,7 @@ def write_csv(
     path : path
     table : Table
     stage : str
-        What `progress` is told.
+        Name of the stage in the updates of `progress`.
     progress : Progress, optional
         May cancel; then nothing was written.
 

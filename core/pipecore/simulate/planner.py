@@ -26,9 +26,9 @@ from pipecore.simulate.sizes import SIZES, PipeSize
 
 RACK_LENGTH = 6.0
 RACK_DEPTH = 3.0
-NEAR = 0.01
+NEAR_CONTACT = 0.01
 """Pipes that nearly touch are this far apart, metres."""
-CLEAR = 0.03
+CLEARANCE = 0.03
 """Free pipes, which may bulge and bow, keep this distance, metres."""
 
 PAINTS = ("galvanised", "steel", "stainless", "cladding", "blue", "green", "yellow", "grey")
@@ -81,7 +81,7 @@ class Planner:
             y, n_pipes = float(self.rng.uniform(0.0, 0.5)), int(self.rng.integers(3, 6))
             for _ in range(n_pipes):
                 size = self._size(largest)
-                gap = float(self.rng.choice([0.0, NEAR, 0.03, 0.12, 0.3]))
+                gap = float(self.rng.choice([0.0, NEAR_CONTACT, 0.03, 0.12, 0.3]))
                 y += gap + size.radius
                 if y + size.radius > RACK_DEPTH:
                     break
@@ -192,7 +192,7 @@ class Planner:
     def add_risers(self) -> None:
         """Verticals from the floor with a flange at the foot, most of them turning off."""
         for _ in range(int(self.rng.integers(2, 5))):
-            self._try(self._riser, CLEAR, free=True)
+            self._try(self._riser, CLEARANCE, free=True)
 
     def _riser(self) -> Run:
         size = self._size(300)
@@ -232,7 +232,7 @@ class Planner:
     def add_oblique_pipes(self) -> None:
         """Pipes in no main direction, some with an elbow of an odd angle."""
         for _ in range(int(self.rng.integers(2, 4))):
-            self._try(self._oblique_pipe, CLEAR, free=True, n_tries=25)
+            self._try(self._oblique_pipe, CLEARANCE, free=True, n_tries=25)
 
     def _oblique_pipe(self) -> Run:
         size = self._size(200)

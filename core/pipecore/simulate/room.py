@@ -11,7 +11,7 @@ from pipecore.geometry import Array
 from pipecore.simulate.placing import place_runs
 from pipecore.simulate.scene import Run, Scene
 
-STEP = 0.02
+SAMPLE_STEP = 0.02
 """Distance of the sampled spheres along the axes, metres."""
 
 
@@ -28,7 +28,7 @@ class Body:
         centres, radii = [], []
         for placed in place_runs(Scene((run,), ())).elements:
             element = placed.element
-            n_samples = max(2, int(np.ceil(element.axis.length / STEP)) + 1)
+            n_samples = max(2, int(np.ceil(element.axis.length / SAMPLE_STEP)) + 1)
             chainage = np.linspace(0.0, element.axis.length, n_samples)
             centres.append(element.axis.at(chainage))
             radii.append(element.radius_at(chainage))

@@ -39,7 +39,7 @@ def load_scene(path: Path) -> Scene:
         raise SceneError(f"Cannot read the scene file {path}: {error}.") from error
     try:
         scene = scene_from_dict(table)
-        # What cannot be built should be told with the file's name, too.
+        # Errors of what cannot be built name the file, too.
         place_runs(scene)
         clutter_parts(scene.clutter)
         return scene

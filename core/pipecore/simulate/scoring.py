@@ -12,7 +12,7 @@ from pipecore.simulate import TrueDeformation, TrueElement, Truth
 from pipecore.simulate.scoring_deformations import WHOLE_AXIS, DeformationMatch, match_deformations
 from pipecore.types import Deformation, Element, ElementKind, Result
 
-STEP = 0.01
+SAMPLE_STEP = 0.01
 """Axes are compared every so many metres."""
 MAX_OFFSET_RATIO, MIN_OFFSET = 0.15, 0.005
 MAX_ANGLE = np.deg2rad(10.0)
@@ -267,7 +267,7 @@ def _find(true: _TrueAxis, reported: list[Element], min_arc: float) -> _Finding:
         float(weight * (is_visible & is_found).sum()),
         _stretches(element, chainage, weight, is_visible & ~is_found),
     )
-    # Of a short stub or a sliver nobody can tell the kind.
+    # The kind of a short stub or a sliver cannot be determined.
     needed = 0.1 if element.kind is ElementKind.CYLINDER else 0.5 * element.axis.length
     finding.is_judged = finding.visible_length >= needed
     counts = [int((m & is_visible).sum()) for m in matches]
@@ -328,7 +328,7 @@ def _moved(element: Element, shift: Array) -> Element:
 
 def _samples(element: Element | TrueElement) -> tuple[Array, float]:
     """Chainages in the middle of steps, and the length that each stands for."""
-    n_steps = max(1, round(element.axis.length / STEP))
+    n_steps = max(1, round(element.axis.length / SAMPLE_STEP))
     weight = element.axis.length / n_steps
     chainage = np.asarray((np.arange(n_steps) + 0.5) * weight, np.float64)
     return chainage, weight
@@ -350,7 +350,7 @@ def _matches(
     along, offset, _ = other.axis.pipe_coordinates(one.axis.at(chainage))
     radius = one.radius_at(chainage)
     cosine = np.abs(np.einsum("ij,ij->i", one.axis.tangent(chainage), other.axis.tangent(along)))
-    is_beside = (along >= -STEP / 2) & (along <= other.axis.length + STEP / 2)
+    is_beside = (along >= -SAMPLE_STEP / 2) & (along <= other.axis.length + SAMPLE_STEP / 2)
     difference = _radius_difference(one, chainage, other)
     return np.asarray(
         is_beside

@@ -8,7 +8,7 @@ from pipecore.geometry import unit
 from pipecore.simulate.planner import (
     ACROSS,
     ALONG,
-    NEAR,
+    NEAR_CONTACT,
     RACK_DEPTH,
     RACK_LENGTH,
     UP,
@@ -41,7 +41,7 @@ class Surroundings:
         low_y = min(float((b.centres[:, 1] - b.radii).min()) for b in self.plan.room.bodies)
         length, middle = RACK_LENGTH + 3.0, RACK_LENGTH / 2
         self.plan.clutter.append(Box((middle, 2.2, -0.05), (length, 9.0, 0.1)))
-        self.wall_y = low_y - float(self.plan.rng.choice([NEAR, 0.05, 0.3]))
+        self.wall_y = low_y - float(self.plan.rng.choice([NEAR_CONTACT, 0.05, 0.3]))
         self.plan.clutter.append(
             Box((middle, self.wall_y - 0.05, 1.7), (length, 0.1, 3.4), material="plaster")
         )
