@@ -1,6 +1,8 @@
 """What a newcomer meets first: names, arrays in, short texts out, mistakes answered in words."""
 
+import importlib
 import math
+import pkgutil
 import subprocess
 import sys
 from typing import Any
@@ -30,6 +32,13 @@ def test_that_all_that_dir_shows_is_there() -> None:
         assert getattr(pipecore, name) is not None
     with pytest.raises(AttributeError, match="'pipecore' has no attribute 'detekt'"):
         pipecore.detekt  # noqa: B018
+
+
+def test_that_every_module_has_what_it_says_it_exports() -> None:
+    modules = pkgutil.walk_packages(pipecore.__path__, "pipecore.")
+    for name in (m.name for m in modules if m.name != "pipecore.__main__"):
+        module = importlib.import_module(name)
+        assert [n for n in getattr(module, "__all__", ()) if not hasattr(module, n)] == [], name
 
 
 def test_that_subpackages_need_no_import_of_their_own() -> None:

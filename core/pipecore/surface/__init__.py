@@ -29,13 +29,13 @@ __all__ = [
     "Surface",
     "average_voxels",
     "cells_of",
+    "downsample",
     "estimate_normals",
     "fit_planes",
     "index_type",
     "median_spacing",
     "planes_of_points",
     "sample_surface",
-    "thin",
 ]
 
 NEIGHBOURHOOD = 2.8
