@@ -130,6 +130,18 @@ def test_that_a_surface_may_be_as_wavy_as_its_arc_and_length_allow():
     assert failed_gate(*wavy_pipe(1.35 * limit)) == "surface_is_smooth"
 
 
+def test_that_a_wavy_surface_of_an_uncertain_radius_is_taken_for_chance():
+    """Either alone is within its limit; together they are what folds and limbs show."""
+    least, most = acceptance.WAVINESS
+    wavy, surface, settings = wavy_pipe(0.7 * (least + 0.8 * (most - least)) * RADIUS)
+    uncertain = fit_of(wavy.fit.model, 0.95 * acceptance.MAX_RADIUS_SD * RADIUS)
+    smooth, nothing, _ = pipe(fit=uncertain)
+    assert failed_gate(wavy, surface, settings) is None
+    assert failed_gate(smooth, nothing, settings) is None
+    both = replace(wavy, fit=uncertain)
+    assert failed_gate(both, surface, settings) == "is_surface_of_revolution"
+
+
 def test_that_every_gate_of_the_table_has_an_example():
     gates = {gate.__name__ for of_shape in GATES.values() for gate in of_shape}
-    assert gates == {*EXAMPLES, "surface_is_smooth"}
+    assert gates == {*EXAMPLES, "surface_is_smooth", "is_surface_of_revolution"}

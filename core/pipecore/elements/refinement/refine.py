@@ -99,17 +99,25 @@ class FittedElement:
     """How its section leaves the round one; None where it hardly does."""
 
     @property
+    def _n_sectors(self) -> float:
+        return max(self.extent.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
+
+    @property
+    def excess_misfit(self) -> float:
+        """How far the section leaves circle and oval beyond what noise does, metres."""
+        by_noise = 0.5 * np.pi * self.fit.sigma**2 * self._n_sectors / max(len(self.inliers), 1)
+        return float(np.sqrt(max(self.misfit**2 - by_noise, 0.0)))
+
+    @property
     def radius_sd(self) -> float:
         """Standard deviation of the radius: the fit's, and what is off the round section.
 
         Sectors that leave circle and oval by more than noise does are as many wrong
         measurements of the radius as there are sectors; metres.
         """
-        n_sectors = max(self.extent.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
-        by_noise = 0.5 * np.pi * self.fit.sigma**2 * n_sectors / max(len(self.inliers), 1)
-        excess = max(self.misfit**2 - by_noise, 0.0)
+        off_round = self.excess_misfit / np.sqrt(self._n_sectors)
         factor = float(radius_sd_factor(self.extent.arc))
-        return float(np.hypot(self.fit.radius_sd, factor * np.sqrt(excess / n_sectors)))
+        return float(np.hypot(self.fit.radius_sd, factor * off_round))
 
     @property
     def radii(self) -> tuple[float, float]:
