@@ -124,6 +124,8 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
         element_id=measured.element_id,
         deviation=measured.deviation,
         seconds=timer.seconds,
+        unit=cloud.unit,
+        notes=cloud.notes,
     )
 
 
@@ -142,6 +144,8 @@ def _empty_result(cloud: PointCloud, settings: Settings) -> Result:
         element_id=np.empty(0, np.int32),
         deviation=np.empty(0, np.float32),
         seconds={},
+        unit=cloud.unit,
+        notes=cloud.notes,
     )
 
 

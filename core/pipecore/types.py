@@ -24,15 +24,47 @@ from pipecore.display import Summarised
 from pipecore.formatting import format_clock, format_measure
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.local_frame import choose_origin, to_local
+from pipecore.notes import Note
 from pipecore.reasons import Reason
-from pipecore.settings import Settings
+from pipecore.settings import LengthUnit, Settings
 from pipecore.table import Table
+from pipecore.units import FileUnit
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32] | NDArray[np.float64]
 
 NO_ID = 0
 """The id of "none": ids of stacks, segments, elements, runs and deformations start at 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """More values of each point, as a file stores them.
+
+    Parameters
+    ----------
+    values : ndarray
+        Of any integer or floating type, shape (n,) or (n, k).
+    scale, offset : float
+        What stands for a stored value v is scale · v + offset.
+    no_data : float, optional
+        The stored value that stands for none.
+    description : str
+        What the file says of it.
+    """
+
+    values: NDArray[Any]
+    scale: float = 1.0
+    offset: float = 0.0
+    no_data: float | None = None
+    description: str = ""
+
+    def scaled(self) -> Array:
+        """Return what the stored values stand for, float64; nan where there is none."""
+        scaled = self.values * self.scale + self.offset
+        if self.no_data is not None:
+            scaled = np.where(self.values == self.no_data, np.nan, scaled)
+        return np.asarray(scaled, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -55,10 +87,27 @@ class PointCloud(Summarised):
         uint8, shape (n, 3).
     classification : ndarray, optional
         ASPRS classes, uint8, shape (n,).
+    station : ndarray, optional
+        Id of the station that each point was scanned from, from 1 on, uint16, shape (n,);
+        None where nothing tells.
+    station_names : tuple of str
+        Where each station comes from: a file, or a file and a scan in it.
     stations : ndarray
-        Scanner positions in local coordinates where the file knows them, shape (k, 3).
+        Scanner positions in local coordinates, shape (k, 3): of the stations in the order
+        of their ids, nan where a file does not know one.
     crs : str
         The coordinate reference system's name, or "".
+    crs_wkt : str
+        Its well-known text, where the file or its EPSG code gives one, or "".
+    unit : FileUnit
+        Unit of the coordinates in the file.
+    step : float
+        Steps in which the file keeps coordinates, metres, where they are coarse (rounding
+        adds an SD of step/√12 to each); 0 where they are fine.
+    fields : mapping of str to Field
+        More values of each point, as the file has them, where `read` was asked for them.
+    notes : tuple of Note
+        What a reader should know of the file: what was left out, its unit, its errors.
     source : Path, optional
         The file it was read from.
     """
@@ -68,8 +117,15 @@ class PointCloud(Summarised):
     intensity: NDArray[np.float32] | None = None
     rgb: NDArray[np.uint8] | None = None
     classification: NDArray[np.uint8] | None = None
+    station: NDArray[np.uint16] | None = None
+    station_names: tuple[str, ...] = ()
     stations: Array = field(default_factory=lambda: np.empty((0, 3)))
     crs: str = ""
+    crs_wkt: str = ""
+    unit: FileUnit = FileUnit()
+    step: float = 0.0
+    fields: Mapping[str, Field] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
     source: Path | None = None
 
     @classmethod
@@ -606,6 +662,10 @@ class Result(Summarised):
         What a person calls runs, by their ids; the others go by number.
     own_settings : mapping of int to Settings
         Of elements that were detected again with other settings, by their ids.
+    unit : FileUnit
+        Unit of the file's coordinates, as the cloud was read; see `file_unit`.
+    notes : tuple of Note
+        What was noted when the cloud was read.
     """
 
     settings: Settings
@@ -623,6 +683,14 @@ class Result(Summarised):
     edits: tuple[str, ...] = ()
     run_names: Mapping[int, str] = field(default_factory=dict)
     own_settings: Mapping[int, Settings] = field(default_factory=dict)
+    unit: FileUnit = FileUnit()
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def file_unit(self) -> FileUnit:
+        """Unit of the file's coordinates: the settings', or that of the cloud if automatic."""
+        chosen = self.settings.input.length_unit
+        return self.unit if chosen is LengthUnit.AUTO else FileUnit.of(chosen)
 
     def settings_of(self, element_id: int) -> Settings:
         """Return the settings with which an element was found."""

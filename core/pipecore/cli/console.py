@@ -4,10 +4,12 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
 from pipecore.errors import CancelledError
+from pipecore.notes import Note
 
 
 class Console:
@@ -105,6 +107,12 @@ class Console:
         self._end_stage(is_done=True)
         if not self._is_quiet:
             print(text, file=sys.stderr, flush=True)
+
+    def warn(self, notes: Iterable[Note]) -> None:
+        """Print notes on what was read on standard error, a line each, also when quiet."""
+        for note in notes:
+            self._end_stage(is_done=True)
+            print(f"Note: {' '.join(str(note).split())}", file=sys.stderr, flush=True)
 
     def complain(self, text: str) -> None:
         """Print an error as one line on standard error."""

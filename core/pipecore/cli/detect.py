@@ -62,7 +62,7 @@ def _detected(
 ) -> Iterator[tuple[PointCloud, Result]]:
     """Read and detect, in tiles if the scan is larger than the memory it may take."""
     box = args.box and np.reshape(args.box, (2, 3))
-    need = estimate_need(args.inputs, settings.tiling, box)
+    need = estimate_need(args.inputs, settings.tiling, box, settings.input.columns)
     if need.is_too_large:
         console.note(
             f"{need.n_points:,} points would take about {need.bytes_in_one_piece / GIB:.1f} GiB; "
@@ -70,10 +70,11 @@ def _detected(
         )
         beside = args.output.absolute().parent
         with detect_in_tiles(args.inputs, settings, console, beside, box) as found:
+            console.warn(found[0].notes)
             yield found
         return
-    unit = settings.input.length_unit
-    cloud = io.read(args.inputs, length_unit=unit, box=box, progress=console)
+    cloud = io.read(args.inputs, box=box, progress=console, **vars(settings.input))
+    console.warn(cloud.notes)
     yield cloud, detect(cloud, settings, console)
 
 

@@ -3,7 +3,7 @@
 import argparse
 import dataclasses
 import inspect
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -11,6 +11,10 @@ from typing import Any, get_type_hints
 import pipecore
 from pipecore.settings import FieldSpec, Settings, iterate_fields
 
+READING = "input.length_unit", "input.flagged_points", "input.stations", "input.columns"
+"""Settings of every command that reads scans."""
+SHORT = "input.length_unit", "input.columns"
+"""Settings whose flags may be given without their group."""
 SETTING = "setting:"
 """Prefix of the names under which the parser keeps settings, before their dotted keys."""
 
@@ -65,7 +69,7 @@ def _add_detect(commands: Any) -> None:
         nargs="+",
         type=Path,
         metavar="INPUT",
-        help="scan (LAS, LAZ, E57, PLY, PCD, PTS, XYZ, CSV); several are taken as one cloud",
+        help="scan (LAS, LAZ, E57, PTX, PLY, PCD, PTS, XYZ, CSV); several are taken as one cloud",
     )
     parser.add_argument(
         "-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the report"
@@ -121,17 +125,24 @@ def _add_info(commands: Any) -> None:
     )
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.set_defaults(quiet=False, shows_stages=False)
+    _add_settings(parser, READING)
 
 
-def _add_settings(parser: argparse.ArgumentParser) -> None:
+def _add_settings(parser: argparse.ArgumentParser, keys: Collection[str] | None = None) -> None:
+    """Add flags for the settings with these keys, or for all."""
     groups: dict[str, Any] = {}
     kinds = get_type_hints(Settings)
     for field in dataclasses.fields(Settings):
+        if keys is not None and not any(key.startswith(f"{field.name}.") for key in keys):
+            continue
         title = (inspect.getdoc(kinds[field.name]) or field.name).splitlines()[0].rstrip(".")
         groups[field.name] = parser.add_argument_group(f"settings: {title[0].lower()}{title[1:]}")
     for key, spec in iterate_fields():
+        if keys is not None and key not in keys:
+            continue
         groups[spec.group].add_argument(
             f"--{spec.group}-{spec.name}".replace("_", "-"),
+            *([f"--{spec.name}".replace("_", "-")] if key in SHORT else []),
             dest=SETTING + key,
             metavar=_metavar(spec),
             help=_help(spec),

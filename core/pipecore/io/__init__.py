@@ -10,15 +10,16 @@ Importing this package imports none of the libraries that read the formats.
 
 from pipecore.io.atomic import write_directory, write_file
 from pipecore.io.mapped import reserve
-from pipecore.io.reading import Box, corners_of, read
+from pipecore.io.reading import Corners, corners_of, read
 from pipecore.io.registry import Format, file_filter, formats, identify
-from pipecore.io.summary import FileInfo, info
+from pipecore.io.summary import FileInfo, StationInfo, info
 from pipecore.io.writing import write_laz
 
 __all__ = [
-    "Box",
+    "Corners",
     "FileInfo",
     "Format",
+    "StationInfo",
     "corners_of",
     "file_filter",
     "formats",

@@ -66,17 +66,17 @@ class MappedFile:
     Parameters
     ----------
     path : Path
-    dtype : type
+    dtype : dtype or type
     width : int, optional
         Number of columns; None for one dimension.
     """
 
-    def __init__(self, path: Path, dtype: type, width: int | None) -> None:
+    def __init__(self, path: Path, dtype: np.dtype[Any] | type, width: int | None) -> None:
         self._path = path
         self._dtype = np.dtype(dtype)
         self._row_shape = () if width is None else (width,)
 
-    def resized(self, n_rows: int) -> NDArray[np.generic]:
+    def resized(self, n_rows: int) -> NDArray[Any]:
         """Return the array with so many rows; new ones are zero."""
         shape = (n_rows, *self._row_shape)
         reserve(self._path, int(np.prod(shape)) * self._dtype.itemsize)

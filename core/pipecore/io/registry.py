@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipecore.errors import ReadError
-from pipecore.io.source import Source
+from pipecore.io.formats import ptx, unread
+from pipecore.io.source import DEFAULT, OpenOptions, Source
 
 HEAD_BYTES = 4096
 
@@ -35,8 +36,13 @@ class Format:
     module: str
     signature: re.Pattern[bytes] | None = None
 
-    def open(self, path: Path) -> AbstractContextManager[Source]:
+    def open(self, path: Path, options: OpenOptions = DEFAULT) -> AbstractContextManager[Source]:
         """Open a file of this format.
+
+        Parameters
+        ----------
+        path : Path
+        options : OpenOptions
 
         Raises
         ------
@@ -44,21 +50,23 @@ class Format:
             From here or from the source's chunks.
         """
         module = importlib.import_module(f"pipecore.io.formats.{self.module}")
-        open_source: Callable[[Path], AbstractContextManager[Source]] = module.open_source
-        return open_source(path)
+        open_source: Callable[[Path, OpenOptions], AbstractContextManager[Source]]
+        open_source = module.open_source
+        return open_source(path, options)
 
 
 _TEXT = Format("Text", (".pts", ".xyz", ".txt", ".csv", ".asc"), "text")
 _FORMATS = (
     Format("LAS/LAZ", (".las", ".laz"), "las", re.compile(rb"LASF")),
     Format("E57", (".e57",), "e57", re.compile(rb"ASTM-E57")),
-    Format("PLY", (".ply",), "ply", re.compile(rb"ply[ \t]*[\r\n]")),
+    Format("PLY", (".ply",), "ply", re.compile(rb"\s*ply[ \t]*[\r\n]")),
     Format(
         "PCD",
         (".pcd",),
         "pcd",
         re.compile(rb"\s*(#[^\n]*PCD|(#[^\n]*\n\s*)*(VERSION|FIELDS)\s)"),
     ),
+    Format("PTX", (".ptx",), "ptx", ptx.SIGNATURE),
     _TEXT,
 )
 
@@ -98,6 +106,7 @@ def identify(path: Path) -> Format:
             return candidate
     if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         raise ReadError("“{name}” is UTF-16 text; save it as UTF-8 or plain text.", name=path.name)
+    unread.check_not_foreign(path, head)
     by_ending = next((f for f in _FORMATS if path.suffix.lower() in f.endings), None)
     if b"\0" not in head and by_ending is not None and by_ending.module in ("text", "pcd"):
         return by_ending
@@ -136,7 +145,7 @@ def _head(path: Path) -> bytes:
 
 
 def _is_table(head: bytes) -> bool:
-    """Tell whether the head holds a line of at least three numbers, and nothing binary."""
+    """Return whether the head holds a line of at least three numbers, and nothing binary."""
     number = rb"[-+]?\d+([.,]\d*)?([eE][-+]?\d+)?"
     line_of_numbers = rb"(?m)^\s*" + number + rb"([ \t;,]+" + number + rb"){2}"
     return b"\0" not in head and re.search(line_of_numbers, head) is not None

@@ -1,18 +1,48 @@
 """What every format gives: a source, whose points come in chunks."""
 
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.errors import PipecoreError, ReadError
+from pipecore.io.crs import NO_SYSTEM, ReferenceSystem
+from pipecore.notes import Note
+from pipecore.settings import FlaggedPoints
 from pipecore.types import Array
 
 CHUNK_POINTS = 250_000
 """Points of one chunk: read in well under half a second in every binary format."""
+
+Rows = NDArray[np.bool_] | NDArray[np.intp] | slice
+"""Which points of a chunk."""
+
+
+@dataclass(frozen=True)
+class OpenOptions:
+    """How a file is to be read.
+
+    Parameters
+    ----------
+    columns : str
+        What the columns of a text file hold; see `InputSettings.columns`.
+    flagged_points : FlaggedPoints
+        What becomes of points that a file marks as withheld or as noise.
+    has_fields : bool
+        Whether chunks hold all values of a point.
+    """
+
+    columns: str = ""
+    flagged_points: FlaggedPoints = FlaggedPoints.LEAVE_OUT
+    has_fields: bool = False
+
+
+DEFAULT = OpenOptions()
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +62,10 @@ class Chunk:
         shape (m, 3).
     classification : ndarray, optional
         uint8, shape (m,).
+    station : ndarray or int, optional
+        The file's own number of the station of each point, integer, shape (m,), or of all.
+    fields : mapping of str to ndarray
+        All other values of each point, if they were asked for, shapes (m,) or (m, k).
     """
 
     xyz: Array
@@ -39,6 +73,45 @@ class Chunk:
     intensity: NDArray[np.float32] | None = None
     rgb: NDArray[np.uint8] | NDArray[np.uint16] | None = None
     classification: NDArray[np.uint8] | None = None
+    station: NDArray[Any] | int | None = None
+    fields: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.xyz)
+
+    def take(self, rows: Rows) -> "Chunk":
+        """Return some of the points."""
+        return Chunk(
+            self.xyz[rows],
+            self.fraction,
+            None if self.intensity is None else self.intensity[rows],
+            None if self.rgb is None else self.rgb[rows],
+            None if self.classification is None else self.classification[rows],
+            self.station[rows] if isinstance(self.station, np.ndarray) else self.station,
+            {name: values[rows] for name, values in self.fields.items()},
+        )
+
+
+@dataclass(frozen=True)
+class FieldInfo:
+    """How the values of a field are stored; see `pipecore.types.Field`."""
+
+    scale: float = 1.0
+    offset: float = 0.0
+    no_data: float | None = None
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class ScanInfo:
+    """A scan in a file: its name, and the scanner's position in the file's unit, shape (3,).
+
+    The position is nan where the file does not know it.
+    """
+
+    name: str
+    position: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +128,21 @@ class Source:
         As the header says, held against the file's size; None if it does not say.
     bounds : ndarray, optional
         Lowest and highest world coordinates as the header says, shape (2, 3).
-    crs : str
-        The coordinate reference system's name, or "".
-    n_scans : int
-    stations : ndarray
-        Scanner positions, world coordinates in the file's unit, shape (k, 3).
+    system : ReferenceSystem
+    scans : list of ScanInfo
+        The scans of a file that consists of scans, each of which is a station; the chunks'
+        `station` is the place in this list. Grows until the last chunk is read. Empty for
+        other files, whose `station` only tells stations apart where it varies.
+    guid : str
+        What identifies the project that the file is a part of, or "".
+    step : float
+        Steps of the coordinates as the header says, in the file's unit; 0 if it does not say.
+    field_infos : mapping of str to FieldInfo
+        Of fields that are not stored as they are.
+    notes : list of Note
+        What is to be said of the file; grows until the last chunk is read.
+    left_out : Counter of str
+        How many points were left out by the format, by the reasons of `pipecore.io.left_out`.
     overview : callable, optional
         Gives a few points from all over the file, where they can be had without the others.
     within : callable, optional
@@ -75,9 +158,13 @@ class Source:
     fields: tuple[str, ...]
     n_points: int | None = None
     bounds: Array | None = None
-    crs: str = ""
-    n_scans: int = 1
-    stations: Array = field(default_factory=lambda: np.empty((0, 3)))
+    system: ReferenceSystem = NO_SYSTEM
+    scans: list[ScanInfo] = field(default_factory=list)
+    guid: str = ""
+    step: float = 0.0
+    field_infos: Mapping[str, FieldInfo] = field(default_factory=dict)
+    notes: list[Note] = field(default_factory=list)
+    left_out: Counter[str] = field(default_factory=Counter)
     overview: Callable[[], Chunk] | None = None
     within: Callable[[Array], Iterator[Chunk]] | None = None
     count_within: Callable[[Array], int] | None = None
@@ -95,7 +182,7 @@ CAUSES = {
 
 
 @contextmanager
-def told_as_read_errors(path: Path, format_name: str) -> Iterator[None]:
+def raise_read_errors(path: Path, format_name: str) -> Iterator[None]:
     """Turn whatever a format's library raises on a damaged file into a `ReadError`."""
     try:
         yield

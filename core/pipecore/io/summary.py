@@ -1,21 +1,45 @@
-"""What is in a file, without reading more of it than that takes."""
+"""What is in a file, without keeping its points."""
 
 import os
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from pipecore.errors import ReadError
-from pipecore.io.reading import FARTHEST
+from pipecore.io import coordinates
+from pipecore.io.left_out import STRAY, left_out_notes
+from pipecore.io.reading import common_unit, no_points
 from pipecore.io.registry import identify
-from pipecore.io.source import Source
+from pipecore.io.screening import Screen, Whereabouts
+from pipecore.io.source import Chunk, OpenOptions, Source
+from pipecore.io.spacing import estimate_spacing
+from pipecore.io.stations import StationTable
+from pipecore.local_frame import choose_origin
+from pipecore.notes import Note
 from pipecore.progress import NoProgress, Progress
-from pipecore.robust import sample_evenly
+from pipecore.settings import FlaggedPoints, LengthUnit, StationSource
 from pipecore.types import Array
+from pipecore.units import FileUnit
 
 SAMPLE_POINTS = 500_000
-SAMPLE_QUERIES = 5_000
+
+
+@dataclass(frozen=True)
+class StationInfo:
+    """A station of a file.
+
+    Parameters
+    ----------
+    name : str
+    n_points : int
+    position : tuple of float, optional
+        Where the scanner stood, world coordinates in the file's unit.
+    """
+
+    name: str
+    n_points: int
+    position: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +52,7 @@ class FileInfo:
     format : str
         Its format's name, such as “LAS/LAZ”.
     n_points : int
-        Valid points; those that the header announces if it also gives their extent.
+        As many as `pipecore.read` gives.
     minimum, maximum : ndarray
         Corners of the box around the points, world coordinates, float64, shape (3,).
     spacing : float
@@ -37,9 +61,17 @@ class FileInfo:
         What the file calls the values of a point.
     crs : str
         The coordinate reference system's name, or "".
+    unit : FileUnit
+        Unit of the coordinates, as `pipecore.read` takes it.
     n_scans : int
     n_stations : int
         Scans whose scanner position is known.
+    stations : tuple of StationInfo
+        Empty where nothing tells stations apart.
+    left_out : mapping of str to int
+        How many points are left out, by the reasons of `pipecore.io.left_out`.
+    notes : tuple of Note
+        As those of the cloud that `pipecore.read` gives.
     """
 
     path: Path
@@ -52,13 +84,32 @@ class FileInfo:
     crs: str
     n_scans: int
     n_stations: int
+    unit: FileUnit = FileUnit()
+    stations: tuple[StationInfo, ...] = ()
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
 
 
-def info(path: str | os.PathLike[str], *, progress: Progress | None = None) -> FileInfo:
+def info(
+    path: str | os.PathLike[str],
+    *,
+    length_unit: LengthUnit = LengthUnit.AUTO,
+    flagged_points: FlaggedPoints = FlaggedPoints.LEAVE_OUT,
+    stations: StationSource = StationSource.AUTO,
+    columns: str = "",
+    progress: Progress | None = None,
+) -> FileInfo:
     """Return what is in a point cloud file.
 
-    A LAS file's header and its first points are enough; other headers say nothing
-    reliable about the extent, so their points are all read, but not kept.
+    All points are looked at, since headers are often wrong, but none are kept.
+
+    Parameters
+    ----------
+    path : path
+    length_unit, flagged_points, stations, columns
+        As for `pipecore.read`.
+    progress : Progress, optional
+        Told about the stage "reading"; may cancel.
 
     Raises
     ------
@@ -69,45 +120,125 @@ def info(path: str | os.PathLike[str], *, progress: Progress | None = None) -> F
     """
     path, progress = Path(path), progress or NoProgress()
     file_format = identify(path)
-    with file_format.open(path) as source:
-        n_points, bounds, sample = _survey(source, progress)
-        if not len(sample):
-            raise ReadError("“{name}” holds no valid points.", name=path.name)
+    options = OpenOptions(columns, flagged_points)
+    unit, system, notes = common_unit([path], [file_format], options, length_unit)
+    with file_format.open(path, options) as source:
+        survey = _Survey(path, source, unit, stations)
+        for chunk in source.chunks:
+            progress.update("reading", min(chunk.fraction, 1.0))
+            survey.add(chunk)
+        if not survey.end():
+            raise no_points(path, source.left_out)
+        progress.update("reading", 1.0)
+        low, high = survey.bounds()
+        spacing = _spacing(source, np.concatenate(survey.sample), survey.n_points)
+        notes += survey.notes(low, high)
+        spacing_m = spacing * unit.metres
+        notes += coordinates.sense_notes(
+            path, unit, system.name, spacing_m, low, high, is_angular=system.is_geographic
+        )
         return FileInfo(
             path,
             file_format.name,
-            n_points,
-            bounds[0],
-            bounds[1],
-            _spacing(source, sample, n_points),
+            survey.n_points,
+            low,
+            high,
+            spacing,
             source.fields,
-            source.crs,
-            source.n_scans,
-            len(source.stations),
+            system.name,
+            max(1, len(source.scans)),
+            sum(bool(np.isfinite(scan.position).all()) for scan in source.scans),
+            unit,
+            survey.stations(),
+            dict(source.left_out),
+            notes,
         )
 
 
-def _survey(source: Source, progress: Progress) -> tuple[int, Array, Array]:
-    """Return the number of points, their lowest and highest coordinates, and the first ones."""
-    bounds = np.array([[np.inf] * 3, [-np.inf] * 3])
-    kept: list[Array] = []
-    n_valid = n_kept = 0
-    for chunk in source.chunks:
-        progress.update("reading", min(chunk.fraction, 1.0))
-        with np.errstate(invalid="ignore"):
-            xyz = chunk.xyz[(np.abs(chunk.xyz) <= FARTHEST / MILLIMETRE).all(axis=1)]
+class _Survey:
+    """Looks at the points of a file as reading it does, and keeps only some of them."""
+
+    def __init__(self, path: Path, source: Source, unit: FileUnit, stations: StationSource) -> None:
+        self._path, self._source, self._unit = path, source, unit
+        self._screen = Screen()
+        self._screen.begin_file(unit.factors)
+        self._whereabouts: Whereabouts | None = None
+        self._stations = StationTable(stations)
+        self._stations.begin_file(path, source)
+        self._n_by_id = np.zeros(1, np.int64)
+        self._notes: tuple[Note, ...] = ()
+        self.n_points = 0
+        self.sample: list[Array] = []
+        self._n_sample = 0
+
+    def add(self, chunk: Chunk) -> None:
+        """Look at a chunk."""
+        xyz, keep = self._screen.valid(chunk, self._source.left_out)
         if not len(xyz):
-            continue
-        n_valid += len(xyz)
-        bounds = np.array(
-            [np.minimum(bounds[0], xyz.min(axis=0)), np.maximum(bounds[1], xyz.max(axis=0))]
+            return
+        if self._whereabouts is None:
+            self._whereabouts = Whereabouts(choose_origin(xyz))
+            self._notes = coordinates.notes_on_steps(
+                self._path, self._source, chunk.xyz[keep], self._unit
+            )[0]
+        self._whereabouts.add(xyz)
+        self._count(chunk if isinstance(keep, slice) else chunk.take(keep))
+        if self._n_sample < SAMPLE_POINTS:
+            self.sample.append(chunk.xyz[keep][: SAMPLE_POINTS - self._n_sample])
+            self._n_sample += len(self.sample[-1])
+
+    def _count(self, chunk: Chunk) -> None:
+        n = len(chunk)
+        self.n_points += n
+        ids = self._stations.provisional(chunk.station, n)
+        counts = np.bincount(ids) if isinstance(ids, np.ndarray) else np.bincount([ids]) * n
+        longer = max(len(counts), len(self._n_by_id))
+        self._n_by_id = np.pad(self._n_by_id, (0, longer - len(self._n_by_id)))
+        self._n_by_id[: len(counts)] += counts
+
+    def end(self) -> bool:
+        """Take what is known when all is read; return whether there are any points."""
+        left_out = self._source.left_out
+        bounds = self._whereabouts.bounds() if self._whereabouts is not None else None
+        for chunk in self._screen.keep_zeros(bounds, left_out):
+            self._count(chunk)
+        if self._whereabouts is not None and (n := self._whereabouts.n_strays()):
+            left_out[STRAY] += n
+            self.n_points -= n
+        return self.n_points > 0
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest coordinates, in the file's unit."""
+        assert self._whereabouts is not None
+        bounds = self._whereabouts.bounds()
+        assert bounds is not None
+        return bounds[0] / self._unit.factors, bounds[1] / self._unit.factors
+
+    def notes(self, low: Array, high: Array) -> tuple[Note, ...]:
+        """Return what is to be said of the file."""
+        source = self._source
+        return (
+            *self._notes,
+            *source.notes,
+            *coordinates.header_bounds_notes(self._path, source, low, high),
+            *left_out_notes(self._path.name, source.left_out),
         )
-        if n_kept < SAMPLE_POINTS:
-            kept.append(xyz[: SAMPLE_POINTS - n_kept])
-            n_kept += len(kept[-1])
-        elif source.bounds is not None and source.n_points is not None:
-            return source.n_points, source.bounds, np.concatenate(kept)
-    return n_valid, bounds, np.concatenate(kept) if kept else np.empty((0, 3))
+
+    def stations(self) -> tuple[StationInfo, ...]:
+        """Return the stations, with the numbers of their points."""
+        ids, names, positions = self._stations.finish()
+        if ids is None:
+            return ()
+        n_by_station = np.zeros(len(names) + 1, np.int64)
+        np.add.at(n_by_station, ids[: len(self._n_by_id)], self._n_by_id)
+        return tuple(
+            StationInfo(
+                name,
+                int(n),
+                (float(p[0]), float(p[1]), float(p[2])) if np.isfinite(p).all() else None,
+            )
+            for name, n, p in zip(names, n_by_station[1:], positions, strict=True)
+        )
 
 
 def _spacing(source: Source, sample: Array, n_points: int) -> float:
@@ -116,44 +247,3 @@ def _spacing(source: Source, sample: Array, n_points: int) -> float:
         return estimate_spacing(sample, n_points)
     whole = source.neighbourhood()
     return estimate_spacing(whole, len(whole))
-
-
-MILLIMETRE = 1e-3
-"""The smallest unit in which a file may be, metres."""
-
-
-def estimate_spacing(sample: Array, n_points: int) -> float:
-    """Estimate the median distance of a point from its nearest neighbour.
-
-    Parameters
-    ----------
-    sample : ndarray
-        Consecutive points of the file, shape (m, 3).
-    n_points : int
-        Points in all.
-
-    Notes
-    -----
-    Points in the order in which they were scanned are complete where they are, so that
-    their spacing is that of all. Points in random order are thinned; then half of the
-    sample has a wider spacing than all of it, and what that says is carried on to
-    `n_points`.
-    """
-    spacing = _median_spacing(sample)
-    if len(sample) < 100 or n_points <= len(sample):
-        return spacing
-    wider = _median_spacing(sample[: len(sample) // 2])
-    # Surfaces thin by 2^(1/2) when half of the points are gone; complete ones not at all.
-    exponent = np.clip(np.log2(wider / spacing), 0.0, 0.5) if spacing > 0 else 0.0
-    return float(spacing * (len(sample) / n_points) ** (exponent if exponent > 0.2 else 0.0))
-
-
-def _median_spacing(points: Array) -> float:
-    from scipy.spatial import cKDTree  # noqa: PLC0415  (slow to import)
-
-    if len(points) < 2:
-        return float("nan")
-    local = points - points[0]
-    queries = sample_evenly(local, SAMPLE_QUERIES)
-    distances, _ = cKDTree(local, balanced_tree=False).query(queries, k=2)
-    return float(np.median(distances[:, 1]))

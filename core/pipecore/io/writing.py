@@ -1,6 +1,5 @@
 """Writing clouds as LAZ."""
 
-import math
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -12,8 +11,8 @@ from pipecore.errors import WriteError
 from pipecore.io.atomic import write_file
 from pipecore.io.source import CHUNK_POINTS
 from pipecore.progress import NoProgress, Progress, in_chunks
-from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
+from pipecore.units import FileUnit
 
 POINTS_AT_A_TIME = 600_000
 """A dozen of LAZ's own chunks of 50,000, so that threads that compress them end together."""
@@ -30,7 +29,7 @@ def write_laz(
     *,
     factors: Mapping[str, float] | None = None,
     kinds: Mapping[str, DTypeLike] | None = None,
-    length_unit: LengthUnit = LengthUnit.METRE,
+    unit: FileUnit | None = None,
     progress: Progress | None = None,
 ) -> None:
     """Write a cloud as LAZ (1.4, point format 6, or 7 with colours), whole or not at all.
@@ -47,8 +46,8 @@ def write_laz(
         What some of the extra values are multiplied by when they are written.
     kinds : mapping of str to dtype, optional
         As what some of the extra values are written, where that is not what they are.
-    length_unit : LengthUnit
-        Unit of the coordinates written.
+    unit : FileUnit, optional
+        Unit of the coordinates written; by default that of the file the cloud came from.
     progress : Progress, optional
         Told about the stage "writing"; may cancel.
 
@@ -74,9 +73,10 @@ def write_laz(
     header.generating_software = "PipeGUI"
     header.system_identifier = "PipeGUI"
     # A power of ten, so that readers show round numbers.
-    step = 10.0 ** math.floor(math.log10(FINEST / length_unit.metres) + 1e-9)
-    header.scales = np.full(3, step)
-    header.offsets = np.round(cloud.origin / length_unit.metres)
+    metres = (unit or cloud.unit).factors
+    step = 10.0 ** np.floor(np.log10(FINEST / metres) + 1e-9)
+    header.scales = step
+    header.offsets = np.round(cloud.origin / metres)
     header.add_extra_dims(
         [
             laspy.ExtraBytesParams(name, np.dtype(kinds.get(name, _storable(values[:0]).dtype)))
@@ -98,7 +98,7 @@ def write_laz(
             for first in range(start, stop, FILLED_AT_ONCE):
                 rows = slice(first, min(first + FILLED_AT_ONCE, stop))
                 points = records[first - start : rows.stop - start]
-                world = cloud.world(cloud.xyz[rows].astype(np.float64)) / length_unit.metres
+                world = cloud.world(cloud.xyz[rows].astype(np.float64)) / metres
                 steps = np.round((world - header.offsets) / step)
                 if np.abs(steps).max() > np.iinfo(np.int32).max:
                     raise WriteError(

@@ -245,7 +245,7 @@ def write_segments(
             "segment_id": _narrowest(result.segment_id),
             "element_id": _narrowest(result.element_id),
         },
-        length_unit=result.settings.input.length_unit,
+        unit=result.file_unit,
         progress=progress,
     )
 

@@ -86,7 +86,7 @@ def _source(result: Result) -> str:
 
 
 def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str]]:
-    unit = result.settings.input.length_unit
+    unit = result.file_unit
     # An axis at a time: ten times as fast as all three along the rows.
     extent = [float(cloud.xyz[:, i].max()) - float(cloud.xyz[:, i].min()) for i in range(3)]
     on_elements = np.count_nonzero(result.element_id)
@@ -100,6 +100,7 @@ def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str
         ("Coordinates", f"{cloud.crs or 'reference system not known'}, in {unit}"),
         ("Acceptance rule", f"{rule.title} ({rule.source})"),
     ]
+    facts += [("Note on the file", str(note)) for note in result.notes]
     facts += [("Detected again", text) for text in _own_settings(result)]
     if result.seconds:
         facts.append(("Time taken", f"{sum(result.seconds.values()):.0f} s"))

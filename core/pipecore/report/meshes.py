@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipecore.errors import WriteError
 from pipecore.io import write_file
+from pipecore.io.ply_file import write_ply
 from pipecore.report.world import FileCoordinates
 
 if TYPE_CHECKING:
@@ -55,8 +56,6 @@ def write_meshes(
 
 
 def _write_ply(path: Path, meshes: Sequence["SurfaceMesh"], place: FileCoordinates) -> None:
-    from plyfile import PlyData, PlyElement  # noqa: PLC0415 - only where a mesh is asked for
-
     counts = [len(m.vertices) for m in meshes]
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     vertices = np.empty(
@@ -81,11 +80,11 @@ def _write_ply(path: Path, meshes: Sequence["SurfaceMesh"], place: FileCoordinat
         faces["vertex_indices"][done : done + len(mesh.faces)] = mesh.faces + start
         done += len(mesh.faces)
     comments = [f"mesh {i}: {m.name}" for i, m in enumerate(meshes, start=1)]
-    PlyData(
-        [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")],
-        byte_order="<",
-        comments=["PipeGUI", *(c.encode("ascii", "replace").decode() for c in comments)],
-    ).write(str(path))
+    write_ply(
+        path,
+        {"vertex": vertices, "face": faces},
+        ["PipeGUI", *(c.encode("ascii", "replace").decode() for c in comments)],
+    )
 
 
 def _colours(mesh: "SurfaceMesh") -> NDArray[np.uint8]:

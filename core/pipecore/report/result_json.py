@@ -50,7 +50,7 @@ def result_to_dict(result: Result) -> dict[str, Any]:
 
 def _content(result: Result) -> dict[str, Any]:
     """What ``result.json`` holds; profiles are arrays still, all else is plain."""
-    unit = result.settings.input.length_unit
+    unit = result.file_unit
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -58,8 +58,11 @@ def _content(result: Result) -> dict[str, Any]:
         "versions": {"pipecore": pipecore.__version__}
         | {name: version(name) for name in ("numpy", "scipy", "numba")},
         "source": result.source.name if result.source else None,
-        "length_unit": str(unit),
+        "length_unit": unit.name,
         "metres_per_unit": unit.metres,
+        "height_unit": unit.height_name,
+        "metres_per_height_unit": unit.height_metres,
+        "notes": [str(note) for note in result.notes],
         "origin": _plain(result.origin),
         "n_cloud_points": result.n_cloud_points,
         "n_element_points": _n_element_points(result),

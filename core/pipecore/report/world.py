@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipecore.formatting import format_coordinate
-from pipecore.settings import LengthUnit
 from pipecore.types import Array, Result
+from pipecore.units import FileUnit
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,12 +14,12 @@ class FileCoordinates:
     """World coordinates in the unit of the input file, with digits for 0.1 mm."""
 
     origin: Array
-    unit: LengthUnit
+    unit: FileUnit
 
     @classmethod
     def of(cls, result: Result) -> "FileCoordinates":
         """Return those of the file that `result` was detected in."""
-        return cls(result.origin, result.settings.input.length_unit)
+        return cls(result.origin, result.file_unit)
 
     @property
     def decimals(self) -> int:
@@ -28,7 +28,7 @@ class FileCoordinates:
 
     def of_local(self, local: Array) -> Array:
         """File coordinates of local ones (metres), any shape (..., 3)."""
-        return np.asarray((np.asarray(local, np.float64) + self.origin) / self.unit.metres)
+        return np.asarray((np.asarray(local, np.float64) + self.origin) / self.unit.factors)
 
     def display(self, local: Array) -> str:
         """The three coordinates of a local point for people, to the millimetre or so."""

@@ -10,6 +10,8 @@ from pipecore.settings.fields import Group, setting
 class LengthUnit(StrEnum):
     """Unit of the coordinates in a file."""
 
+    AUTO = "auto"
+    """What the file's reference system names, else metres."""
     METRE = "m"
     MILLIMETRE = "mm"
     FOOT = "ft"
@@ -17,8 +19,24 @@ class LengthUnit(StrEnum):
 
     @property
     def metres(self) -> float:
-        """Metres in one unit."""
+        """Metres in one unit; AUTO has none (KeyError)."""
         return {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "us-ft": 1200 / 3937}[self.value]
+
+
+class FlaggedPoints(StrEnum):
+    """What becomes of points that a file marks as withheld or as noise."""
+
+    LEAVE_OUT = "leave out"
+    KEEP = "keep"
+
+
+class StationSource(StrEnum):
+    """What tells from which station a point was scanned."""
+
+    AUTO = "auto"
+    """A column, the scans of a file, point source ids that vary; else each file is a station."""
+    FILES = "files"
+    ONE = "one"
 
 
 class DirectionPreset(StrEnum):
@@ -57,7 +75,26 @@ class InputSettings(Group, name="input"):
     """Reading the file."""
 
     length_unit: LengthUnit = setting(
-        LengthUnit.METRE, "Length unit", "Unit of the coordinates in the file."
+        LengthUnit.AUTO,
+        "Length unit",
+        "Unit of the coordinates in the file; auto: what its reference system names, else metres.",
+    )
+    flagged_points: FlaggedPoints = setting(
+        FlaggedPoints.LEAVE_OUT,
+        "Withheld and noise points",
+        "Points that a LAS file marks as withheld or classes as noise.",
+    )
+    stations: StationSource = setting(
+        StationSource.AUTO,
+        "Stations",
+        "What tells from which station a point was scanned: the files' own ids and scans, "
+        "each file, or all points are of one.",
+    )
+    columns: str = setting(
+        "",
+        "Columns of text",
+        "What the columns of a text file hold, such as “x,y,z,intensity”; “-” for what is "
+        "skipped. Empty: as its header names them or its first lines suggest.",
     )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipecore.io import Box
+from pipecore.io import Corners
 from pipecore.pipeline import detect_in
 from pipecore.progress import NoProgress, Progress
 from pipecore.rules import load_rule
@@ -24,7 +24,7 @@ def detect_in_tiles(
     settings: Settings = Settings(),
     progress: Progress = NoProgress(),
     folder: Path | None = None,
-    box: Box | None = None,
+    box: Corners | None = None,
 ) -> Iterator[tuple[PointCloud, Result]]:
     """Read scans of any size and find their elements and deformations.
 
@@ -64,7 +64,7 @@ def detect_in_tiles(
         temporary_store(beside) as store,
         start_engine(settings.tiling.scheduler, store) as engine,
     ):
-        cloud = read_into_store(engine, paths, settings.input.length_unit, progress, box)
+        cloud = read_into_store(engine, paths, settings.input, progress, box)
         sizes = _sizes(settings, tile_bytes(len(cloud), limit, engine.n_at_once))
         yield cloud, detect_in(InTiles(engine, cloud, *sizes), settings, progress)
 

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipecore.io import Box, corners_of, identify
+from pipecore.io import Corners, corners_of, identify
 from pipecore.io.mapped import drop_pages
+from pipecore.io.source import OpenOptions
 from pipecore.settings import TilingSettings
 
 GIB = 2**30
@@ -50,10 +51,16 @@ class Need:
         return self.bytes_in_one_piece > self.limit
 
 
-def estimate_need(paths: Sequence[Path], settings: TilingSettings, box: Box | None = None) -> Need:
+def estimate_need(
+    paths: Sequence[Path],
+    settings: TilingSettings,
+    box: Corners | None = None,
+    columns: str = "",
+) -> Need:
     """Compare what the detection in one piece would take with the memory limit.
 
-    Of a box it is known how many points it holds at most where a file has an octree.
+    Of a box it is known how many points it holds at most where a file has an octree. `columns`
+    are those of text files; see `InputSettings.columns`.
 
     Raises
     ------
@@ -62,7 +69,7 @@ def estimate_need(paths: Sequence[Path], settings: TilingSettings, box: Box | No
     """
     n_points = 0
     for path in paths:
-        with identify(path).open(path) as source:
+        with identify(path).open(path, OpenOptions(columns)) as source:
             n_most = source.n_points or path.stat().st_size // TEXT_BYTES
             if box is not None and source.count_within is not None:
                 n_most = source.count_within(corners_of(box))

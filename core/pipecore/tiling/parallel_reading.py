@@ -5,9 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipecore import io
-from pipecore.io.parts import Part, plan_parts, read_part, remove_parts
+from pipecore.io.parts import FilePart, finish_parts, plan_parts, read_part, remove_parts
 from pipecore.progress import Progress
-from pipecore.settings import LengthUnit
+from pipecore.settings import InputSettings
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.store import StopWhenUnwanted, Store
 from pipecore.types import PointCloud
@@ -16,9 +16,9 @@ from pipecore.types import PointCloud
 def read_into_store(
     engine: Engine,
     paths: Sequence[Path],
-    length_unit: LengthUnit,
+    settings: InputSettings,
     progress: Progress,
-    box: io.Box | None = None,
+    box: io.Corners | None = None,
 ) -> PointCloud:
     """Read scans as `pipecore.read` does, into arrays in the store.
 
@@ -30,18 +30,17 @@ def read_into_store(
     absolute = [path.absolute() for path in paths]
     planned = None
     if box is None and engine.sees(absolute):
-        planned = plan_parts(absolute, length_unit, folder)
+        planned = plan_parts(absolute, folder, **vars(settings))
     if planned is not None:
-        parts, cloud = planned
-        tiles = [(part,) for part in parts]
+        tiles = [(part,) for part in planned.parts]
         if all(engine.run(read_part_into_store, tiles, "reading", progress)):
-            return replace(cloud, source=Path(paths[0]))
-        del cloud
+            return replace(finish_parts(folder, planned), source=Path(paths[0]))
+        del planned
         remove_parts(folder)
-    return io.read(paths, length_unit=length_unit, box=box, folder=folder, progress=progress)
+    return io.read(paths, box=box, folder=folder, progress=progress, **vars(settings))
 
 
-def read_part_into_store(store: Store, part: Part) -> bool:
+def read_part_into_store(store: Store, part: FilePart) -> bool:
     """Read one part, on a worker."""
     StopWhenUnwanted(store).update("reading", 0.0)
     return read_part(store.folder, part)

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore import io
 from pipecore.errors import ReadError
+from pipecore.io.formats import las
 from pipecore.io.registry import identify
 from pipecore.settings import LengthUnit, TilingSettings
 from pipecore.tiling import estimate_need
@@ -81,7 +82,7 @@ def test_that_only_the_nodes_that_touch_a_box_are_read(rng, written, monkeypatch
     path, _ = written
     box = box_around(rng)
     unpacked = 0
-    unpack = io.las.unpack_chunks
+    unpack = las.unpack_chunks
 
     def counting(file, header, table, which, selection):
         nonlocal unpacked
@@ -89,7 +90,7 @@ def test_that_only_the_nodes_that_touch_a_box_are_read(rng, written, monkeypatch
         unpacked += len(given)
         return given
 
-    monkeypatch.setattr(io.las, "unpack_chunks", counting)
+    monkeypatch.setattr(las, "unpack_chunks", counting)
     found = io.read(path, box=box)
     n_most = estimate_need([path], TilingSettings(), box).n_points
     assert len(found) < unpacked == n_most < 0.7 * len(io.read(path))
@@ -97,7 +98,7 @@ def test_that_only_the_nodes_that_touch_a_box_are_read(rng, written, monkeypatch
 
 def test_that_the_first_picture_is_of_everywhere(written, monkeypatch):
     path, tree = written
-    monkeypatch.setattr(io.las, "OVERVIEW_POINTS", 700)
+    monkeypatch.setattr(las, "OVERVIEW_POINTS", 700)
     seen = []
     cloud = io.read(path, look=seen.append)
     assert len(seen[0]) == len(tree.rows[0, 0, 0, 0]) == 500
@@ -251,7 +252,7 @@ def test_that_a_node_whose_points_lie_elsewhere_is_told(written):
 def test_that_many_points_come_in_many_chunks(rng, tmp_path, monkeypatch):
     path = tmp_path / "scan.copc.laz"
     write_copc(path, make_points(rng, 60_000), monkeypatch, per_node=3_000)
-    monkeypatch.setattr(io.las, "CHUNK_POINTS", 10_000)
+    monkeypatch.setattr(las, "CHUNK_POINTS", 10_000)
     with identify(path).open(path) as source:
         assert source.within is not None
         chunks = list(source.within(np.array([FAR - 31, FAR + 31])))

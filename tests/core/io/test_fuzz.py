@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plyfile import PlyData
 
 from pipecore import io
 from pipecore.errors import ReadError
@@ -22,13 +21,13 @@ from tests.core.io.writers import (
     write_las,
     write_pcd,
 )
+from tests.ply import write_ply as write_elements
 
 ROUNDS = int(os.environ.get("PIPEGUI_FUZZ_ROUNDS", "40"))
 
 
-def write_ply(path: Path, points: Points, text: bool, byte_order: str = "=") -> Path:
-    PlyData([vertices(points)], text, byte_order).write(path)
-    return path
+def write_ply(path: Path, points: Points, text: bool, byte_order: str = "<") -> Path:
+    return write_elements(path, {"vertex": vertices(points)}, text=text, byte_order=byte_order)
 
 
 def write_scan(path: Path, points: Points) -> Path:

@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import laspy
+import lazrs
 import numpy as np
 from numpy.typing import NDArray
-from plyfile import PlyElement
 from pye57 import libe57
 
 from pipecore.types import PointCloud
@@ -47,25 +47,51 @@ def make_points(rng: np.random.Generator, n: int = 1000) -> Points:
     )
 
 
-def write_las(path: Path, points: Any, *, point_format: int = 7, colour_factor: int = 257) -> Path:
-    """Write points by laspy alone."""
+def write_las(
+    path: Path,
+    points: Any,
+    *,
+    point_format: int = 7,
+    colour_factor: int = 257,
+    chunk_size: int = 50_000,
+) -> Path:
+    """Write points by laspy and lazrs alone."""
     header = laspy.LasHeader(point_format=point_format, version="1.4")
     header.scales = np.full(3, 1e-4)
     header.offsets = np.floor(points.xyz.min(axis=0))
     las = laspy.LasData(header)
     las.xyz = points.xyz
     las.intensity = points.intensity
-    las.classification = points.intensity % 32
+    las.classification = points.intensity % 7
     if point_format in (3, 7):
         las.red, las.green, las.blue = points.rgb.T.astype(np.uint16) * colour_factor
     las.write(path)
+    if path.suffix == ".laz" and chunk_size < 50_000:
+        rewrite_in_chunks(path, las, chunk_size)
     return path
 
 
-def vertices(points: Any, kind: str = "f8", intensity: str = "scalar_Intensity") -> PlyElement:
+def rewrite_in_chunks(path: Path, las: Any, chunk_size: int) -> None:
+    """Pack points anew, so many a chunk."""
+    raw = path.read_bytes()
+    with laspy.open(path) as reader:
+        header = reader.header
+        packing = bytearray(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
+    at = raw.index(bytes(packing))
+    packing[12:16] = chunk_size.to_bytes(4, "little")
+    with path.open("wb") as file:
+        file.write(raw[:at] + packing + raw[at + len(packing) : header.offset_to_point_data])
+        packer = lazrs.LasZipCompressor(file, lazrs.LazVlr(bytes(packing)))
+        packer.compress_many(np.frombuffer(las.points.array.tobytes(), np.uint8))
+        packer.done()
+
+
+def vertices(
+    points: Any, kind: str = "f8", intensity: str = "scalar_Intensity"
+) -> NDArray[np.void]:
     fields = [("x", kind), ("y", kind), ("z", kind), (intensity, "f4")]
     fields += [(colour, "u1") for colour in ("red", "green", "blue")]
-    return PlyElement.describe(np.array(points.rows(), dtype=fields), "vertex")
+    return np.array(points.rows(), dtype=fields)
 
 
 PCD_HEADER = """# .PCD v0.7 - Point Cloud Data file format

@@ -72,7 +72,9 @@ class _UnsoundError(Exception):
     """A tree that cannot be right."""
 
 
-def read_octree(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> Octree | None:
+def read_octree(
+    file: BinaryIO, path: Path, header: "laspy.LasHeader", table: ChunkTable
+) -> Octree | None:
     """Read a COPC file's octree; None if the file has none, or one that is not to be trusted.
 
     Whatever the tree says is held against the file's size and its table of chunks: pages
@@ -87,7 +89,7 @@ def read_octree(file: BinaryIO, path: Path, header: "laspy.LasHeader") -> Octree
     root = info.hierarchy_root_offset, info.hierarchy_root_size
     try:
         entries = _read_pages(file, path.stat().st_size, *root)
-        return _tree_of(entries[entries["n"] > 0], ChunkTable.read_from(file, header), header, info)
+        return _tree_of(entries[entries["n"] > 0], table, header, info)
     except _UnsoundError:
         return None
 

@@ -2,24 +2,28 @@
 
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.io.columns import ChunkMaker, Column, find_columns, has_coordinates
+from pipecore.io.columns import ChunkMaker, Values, find_columns, has_coordinates
 from pipecore.io.records import check_room, read_records
 from pipecore.io.source import (
     CHUNK_POINTS,
+    DEFAULT,
     Chunk,
+    OpenOptions,
+    ScanInfo,
     Source,
     damaged,
-    told_as_read_errors,
+    raise_read_errors,
     truncated,
 )
 from pipecore.io.table import Table, sniff_dialect
+from pipecore.notes import Note
 from pipecore.types import Array
 
 _KINDS = {"F": "f", "I": "i", "U": "u"}
@@ -45,32 +49,56 @@ class _Header:
 
 
 @contextmanager
-def open_source(path: Path) -> Iterator[Source]:
+def open_source(path: Path, options: OpenOptions = DEFAULT) -> Iterator[Source]:
     """Open a PCD file; see `pipecore.io.registry.Format.open`."""
-    with told_as_read_errors(path, "PCD"):
+    with raise_read_errors(path, "PCD"):
         file = path.open("rb")
     with file:
-        with told_as_read_errors(path, "PCD"):
+        with raise_read_errors(path, "PCD"):
             header = _read_header(file, path)
-            columns = find_columns(header.names)
+            columns = find_columns(
+                [n if c else "" for n, c in zip(header.names, header.counts, strict=True)]
+            )
             if not has_coordinates(columns):
                 raise damaged(path, "PCD", "its header names no fields x, y and z")
             room = path.stat().st_size - file.tell()
+            notes: list[Note] = []
             if header.data == "ascii":
                 # A row takes at least one character and the end of the line.
                 check_room(path, room + 1, np.dtype("u2"), header.n_points)
+            elif header.data == "binary":
+                header = _as_held(path, header, room // max(header.dtype.itemsize, 1), notes)
         yield Source(
-            chunks=_chunks(file, path, header, columns),
-            fields=header.names,
+            chunks=_chunks(file, path, header, columns, options),
+            fields=tuple(n for n, c in zip(header.names, header.counts, strict=True) if c),
             n_points=header.n_points,
-            stations=header.station,
+            scans=[ScanInfo(path.stem, position) for position in header.station],
+            notes=notes,
         )
 
 
+def _as_held(path: Path, header: _Header, n_held: int, notes: list[Note]) -> _Header:
+    """The header with as many points as a file holds that ends too early."""
+    if n_held >= header.n_points:
+        return header
+    if n_held < 1:
+        raise truncated(path, header.n_points, 0)
+    notes.append(
+        Note(
+            "“{name}” is truncated: it announces {announced:,} points; the {held:,} that are whole "
+            "were read.",
+            name=path.name,
+            announced=header.n_points,
+            held=n_held,
+        )
+    )
+    return replace(header, n_points=n_held)
+
+
 def _chunks(
-    file: BinaryIO, path: Path, header: _Header, columns: dict[str, int]
+    file: BinaryIO, path: Path, header: _Header, columns: dict[str, int], options: OpenOptions
 ) -> Iterator[Chunk]:
-    with told_as_read_errors(path, "PCD"):
+    with raise_read_errors(path, "PCD"):
         maker = ChunkMaker(tuple(columns))
         packed = next(
             (i for i, name in enumerate(header.names) if name.lower() in ("rgb", "rgba")), None
@@ -80,29 +108,35 @@ def _chunks(
         else:
             packed = None
 
-        def by_role(field: Callable[[int], Column]) -> Callable[[str], Column]:
-            def column(role: str) -> Column:
+        def by_role(field: Callable[[int], Values]) -> Callable[[str], Values]:
+            def column(role: str) -> Values:
                 if packed is not None and role in _SHIFTS:
                     return _unpacked(field(packed), header.types[packed], _SHIFTS[role])
                 return field(columns[role])
 
             return column
 
+        more = _more_fields(header, columns, packed) if options.has_fields else {}
+
+        def chunk(field: Callable[[int], Values], fraction: float) -> Chunk:
+            fields = {name: field(i) for name, i in more.items()}
+            return maker.chunk(by_role(field), fraction, fields)
+
         size = path.stat().st_size
         if not header.n_points:
             return
         if header.data == "ascii":
-            yield from _text_chunks(file, path, header, maker, by_role)
+            yield from _text_chunks(file, path, header, chunk)
         elif header.data == "binary":
             for records, fraction in read_records(file, path, header.dtype, header.n_points, size):
-                yield maker.chunk(by_role(lambda i, r=records: r[f"f{i}"][:, 0]), fraction)  # type: ignore[misc]
+                yield chunk(lambda i, r=records: r[f"f{i}"][:, 0], fraction)  # type: ignore[misc]
         else:
             plain = yield from _decompress(file, path, header, size)
             fields = _split(plain, header)
             for start in range(0, header.n_points, CHUNK_POINTS):
                 rows = slice(start, start + CHUNK_POINTS)
-                yield maker.chunk(
-                    by_role(lambda i, rows=rows: fields[i][rows]),  # type: ignore[misc]
+                yield chunk(
+                    lambda i, rows=rows: fields[i][rows],  # type: ignore[misc]
                     min(1.0, 0.5 + 0.5 * (start + CHUNK_POINTS) / header.n_points),
                 )
 
@@ -111,8 +145,7 @@ def _text_chunks(
     file: BinaryIO,
     path: Path,
     header: _Header,
-    maker: ChunkMaker,
-    by_role: Callable[[Callable[[int], Column]], Callable[[str], Column]],
+    chunk: Callable[[Callable[[int], Values], float], Chunk],
 ) -> Iterator[Chunk]:
     start = file.tell()
     first_line = file.readline(LONGEST_HEADER).decode("latin-1")
@@ -132,18 +165,28 @@ def _text_chunks(
     n_read = 0
     for rows in table.blocks():
         n_read += len(rows)
-        yield maker.chunk(
-            by_role(lambda i, rows=rows: rows[:, first[i]]),  # type: ignore[misc]
+        yield chunk(
+            lambda i, rows=rows: rows[:, first[i]],  # type: ignore[misc]
             n_read / header.n_points,
         )
     if n_read < header.n_points:
         raise truncated(path, header.n_points, n_read)
 
 
+def _more_fields(header: _Header, columns: dict[str, int], packed: int | None) -> dict[str, int]:
+    """Names and places of the values that have no role, but for padding."""
+    taken = {*columns.values(), packed}
+    return {
+        name: i
+        for i, (name, count) in enumerate(zip(header.names, header.counts, strict=True))
+        if i not in taken and count and name != "_"
+    }
+
+
 _SHIFTS = {"red": 16, "green": 8, "blue": 0}
 
 
-def _unpacked(packed: Column, kind: str, shift: int) -> NDArray[np.uint8]:
+def _unpacked(packed: Values, kind: str, shift: int) -> NDArray[np.uint8]:
     """Return one colour of three that are packed into the bits of one value."""
     if kind == "f4":
         bits = np.ascontiguousarray(packed.astype(np.float32)).view(np.uint32)
@@ -164,6 +207,8 @@ def _decompress(
     if n_plain > n_packed * lzf.BEST_RATIO:
         raise damaged(path, "PCD", "it announces more than it can hold")
     check_room(path, n_plain, header.dtype, header.n_points)
+    if n_plain != header.n_points * header.dtype.itemsize:
+        raise damaged(path, "PCD", "its header contradicts the size of its points")
     packed = np.frombuffer(file.read(n_packed), dtype=np.uint8)
     plain = np.empty(n_plain, dtype=np.uint8)
     read = written = 0
@@ -176,14 +221,14 @@ def _decompress(
     return plain
 
 
-def _split(plain: NDArray[np.uint8], header: _Header) -> list[Column]:
+def _split(plain: NDArray[np.uint8], header: _Header) -> list[Values]:
     """Return the fields, each of which a compressed file holds in one piece."""
-    fields: list[Column] = []
+    fields: list[Values] = []
     offset = 0
     for kind, count in zip(header.types, header.counts, strict=True):
         end = offset + int(kind[1:]) * count * header.n_points
         values = plain[offset:end].view("<" + kind)
-        fields.append(values.reshape(header.n_points, count)[:, 0])
+        fields.append(values.reshape(header.n_points, count)[:, 0] if count else values)
         offset = end
     return fields
 
@@ -212,7 +257,7 @@ def _read_header(file: BinaryIO, path: Path) -> _Header:
         raise damaged(path, "PCD", "a SIZE or TYPE of its header does not exist")
     whole = [*counts, *entries.get("POINTS", []), *entries.get("WIDTH", [])]
     whole += entries.get("HEIGHT", [])
-    if not all(number.isdecimal() and len(number) < 19 for number in whole) or "0" in counts:
+    if not all(number.isdecimal() and len(number) < 19 for number in whole):
         raise damaged(path, "PCD", "a number of its header is no whole number")
     if max(map(int, counts)) > 1_000_000:
         raise damaged(path, "PCD", "a COUNT of its header is absurd")
