@@ -21,7 +21,14 @@ from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
 from pipecore.resources import resource
 from pipecore.rules import MEASURE_TEXTS, list_rules
-from pipecore.settings import DirectionPreset, EllipseFit, ProfileMethod, iterate_fields
+from pipecore.settings import (
+    DirectionPreset,
+    EllipseFit,
+    FlaggedPoints,
+    ProfileMethod,
+    StationSource,
+    iterate_fields,
+)
 from pipecore.types import KIND_LABELS, DeformationKind, ElementKind, ReviewState, Verdict
 from pipegui.i18n.texts import DOMAIN, LANGUAGES
 from pipegui.model.document import Background, ColourBy
@@ -32,7 +39,7 @@ from pipegui.window.action_table import MENUS, SPECS
 SOURCES = Path(__file__).parents[1] / "pipegui"
 KEYWORDS = {"tr": None, "mark": None, "trn": (1, 2), "count": (1, 2)}
 CORE = Path(__file__).parents[1] / "core" / "pipecore"
-ERRORS = dict.fromkeys(("ReadError", "WriteError", "SettingsError", "EditError", "Reason"))
+ERRORS = dict.fromkeys(("ReadError", "WriteError", "SettingsError", "EditError", "Reason", "Note"))
 """Their first argument is a text; what is left out here is never shown in the window."""
 NOT_IN_THE_APP = ("simulate", "cli", "tiling", "ellipses")
 MORE_STAGES = (
@@ -65,6 +72,8 @@ def tables() -> Iterator[str]:
         ProfileMethod,
         EllipseFit,
         DirectionPreset,
+        FlaggedPoints,
+        StationSource,
     ):
         yield from (str(value) for value in enum)
     for enum in (ElementKind, DeformationKind, Verdict, ReviewState):

@@ -225,3 +225,14 @@ def truncated(path: Path, announced: int, held: int) -> ReadError:
         announced=announced,
         held=held,
     )
+
+
+def truncated_note(path: Path, announced: int, held: int) -> Note:
+    """Return the note on a file that ends too early, of which the whole points were read."""
+    return Note(
+        "“{name}” is truncated: it announces {announced:,} points; the {held:,} that are whole "
+        "were read.",
+        name=path.name,
+        announced=announced,
+        held=held,
+    )

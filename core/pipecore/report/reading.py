@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipecore.consistency import check_result
 from pipecore.errors import PipecoreError, ReadError
 from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.notes import Note
 from pipecore.progress import NoProgress, Progress
 from pipecore.reasons import Reason
 from pipecore.report.result_json import FORMAT, FORMAT_VERSION
@@ -28,6 +29,7 @@ from pipecore.types import (
     Stack,
     Verdict,
 )
+from pipecore.units import FileUnit
 
 AXES = {"line": LineAxis, "arc": ArcAxis}
 POINT_COLUMNS = {"segment_id": np.int32, "element_id": np.int32, "deviation_mm": np.float32}
@@ -154,6 +156,19 @@ def result_from_dict(plain: Mapping[str, Any]) -> Result:
         edits=tuple(plain.get("edits", ())),
         run_names={int(i): str(name) for i, name in plain.get("run_names", {}).items()},
         own_settings=own_settings,
+        unit=_unit(plain),
+        notes=tuple(Note(str(note)) for note in plain.get("notes", ())),
+    )
+
+
+def _unit(plain: Mapping[str, Any]) -> FileUnit:
+    """The unit of the file's coordinates; heights had no unit of their own at first."""
+    name, metres = str(plain.get("length_unit", "m")), float(plain.get("metres_per_unit", 1.0))
+    return FileUnit(
+        name,
+        metres,
+        str(plain.get("height_unit", name)),
+        float(plain.get("metres_per_height_unit", metres)),
     )
 
 

@@ -24,6 +24,7 @@ from pipecore.io.source import (
     damaged,
     raise_read_errors,
     truncated,
+    truncated_note,
 )
 from pipecore.notes import Note
 from pipecore.settings import FlaggedPoints
@@ -134,7 +135,7 @@ class _Reader:
             raise truncated(path, head.announced, 0)
         notes = list(head.notes)
         if n_points < head.announced:
-            notes.append(_truncated_note(path, head.announced, n_points))
+            notes.append(truncated_note(path, head.announced, n_points))
         elif table is not None and table.is_rebuilt:
             notes.append(_table_note(path))
         wanted = laspy.DecompressionSelection
@@ -197,7 +198,7 @@ class _Reader:
             if is_end:
                 if not n_read:
                     raise truncated(self.path, self.head.announced, 0)
-                self.notes.append(_truncated_note(self.path, self.head.announced, n_read))
+                self.notes.append(truncated_note(self.path, self.head.announced, n_read))
                 return
         (kind,) = self.head.packing[:1]
         if self.table is None and kind != 1:
@@ -289,16 +290,6 @@ def _field_infos(layout: "laspy.PointFormat") -> dict[str, FieldInfo]:
             str(dimension.description),
         )
     return infos
-
-
-def _truncated_note(path: Path, announced: int, held: int) -> Note:
-    return Note(
-        "“{name}” is truncated: it announces {announced:,} points; the {held:,} that are whole "
-        "were read.",
-        name=path.name,
-        announced=announced,
-        held=held,
-    )
 
 
 def _table_note(path: Path) -> Note:

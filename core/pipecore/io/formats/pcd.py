@@ -21,6 +21,7 @@ from pipecore.io.source import (
     damaged,
     raise_read_errors,
     truncated,
+    truncated_note,
 )
 from pipecore.io.table import Table, sniff_dialect
 from pipecore.notes import Note
@@ -83,15 +84,7 @@ def _as_held(path: Path, header: _Header, n_held: int, notes: list[Note]) -> _He
         return header
     if n_held < 1:
         raise truncated(path, header.n_points, 0)
-    notes.append(
-        Note(
-            "“{name}” is truncated: it announces {announced:,} points; the {held:,} that are whole "
-            "were read.",
-            name=path.name,
-            announced=header.n_points,
-            held=n_held,
-        )
-    )
+    notes.append(truncated_note(path, header.n_points, n_held))
     return replace(header, n_points=n_held)
 
 

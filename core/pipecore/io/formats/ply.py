@@ -13,8 +13,8 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.errors import ReadError
 from pipecore.io.columns import ChunkMaker, find_columns, has_coordinates
+from pipecore.io.formats.unread import mesh_error
 from pipecore.io.records import check_room, read_records
 from pipecore.io.source import (
     CHUNK_POINTS,
@@ -25,6 +25,7 @@ from pipecore.io.source import (
     damaged,
     raise_read_errors,
     truncated,
+    truncated_note,
 )
 from pipecore.io.table import Dialect, Table
 from pipecore.notes import Note
@@ -114,11 +115,7 @@ def _check_faces(header: _Header, path: Path, notes: list[Note]) -> None:
     if not header.n_faces:
         return
     if header.n_faces > MESH_FACES * header.vertex.count:
-        raise ReadError(
-            "“{name}” is a mesh: its corners are not a scan. Sample points on it first, such as "
-            "with open3d: read_triangle_mesh(…).sample_points_uniformly(1000000).",
-            name=path.name,
-        )
+        raise mesh_error(path)
     notes.append(
         Note(
             "“{name}” holds {n:,} faces besides its points; only the points are read.",
@@ -173,15 +170,7 @@ def _values(file: BinaryIO, path: Path, header: _Header, notes: list[Note]) -> I
     if n_held < vertex.count:
         if n_held < 1:
             raise truncated(path, vertex.count, 0)
-        notes.append(
-            Note(
-                "“{name}” is truncated: it announces {announced:,} points; the {held:,} that are "
-                "whole were read.",
-                name=path.name,
-                announced=vertex.count,
-                held=n_held,
-            )
-        )
+        notes.append(truncated_note(path, vertex.count, n_held))
     n = min(n_held, vertex.count)
     for records, fraction in read_records(file, path, dtype, n, path.stat().st_size):
         yield lambda i, records=records: records[f"f{i}"], fraction

@@ -29,6 +29,7 @@ from pipecore.io.source import (
     damaged,
     raise_read_errors,
     truncated,
+    truncated_note,
 )
 from pipecore.io.table import Dialect, lines_of, parse_rows
 from pipecore.notes import Note
@@ -153,15 +154,7 @@ def _chunks(
         if not held:
             raise truncated(path, announced, 0)
         if held < announced:
-            notes.append(
-                Note(
-                    "“{name}” is truncated: it announces {announced:,} points; the {held:,} that "
-                    "are whole were read.",
-                    name=path.name,
-                    announced=announced,
-                    held=held,
-                )
-            )
+            notes.append(truncated_note(path, announced, held))
 
 
 def _rows(lines: list[str], source: _Lines) -> Array:

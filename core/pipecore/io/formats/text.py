@@ -14,6 +14,7 @@ from pipecore.io.source import (
     Source,
     raise_read_errors,
     truncated,
+    truncated_note,
 )
 from pipecore.io.table import Table
 from pipecore.notes import Note
@@ -67,15 +68,7 @@ def _chunks(
         if n_rows == 0:
             raise truncated(path, announced, 0)
         if n_rows < announced:
-            notes.append(
-                Note(
-                    "“{name}” is truncated: it announces {announced:,} points; the {held:,} that "
-                    "are whole were read.",
-                    name=path.name,
-                    announced=announced,
-                    held=n_rows,
-                )
-            )
+            notes.append(truncated_note(path, announced, n_rows))
 
 
 def _more_fields(layout: Layout, table: Table) -> dict[str, int]:

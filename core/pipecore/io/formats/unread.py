@@ -8,35 +8,34 @@ from pipecore.errors import ReadError
 _EXPORT = "E57, LAS, LAZ, PTX or PLY"
 
 _PROGRAMS = {
-    ".fls": ("a FARO scan", "FARO SCENE"),
-    ".lsproj": ("a project of FARO SCENE", "FARO SCENE"),
-    ".fws": ("a workspace of FARO SCENE", "FARO SCENE"),
-    ".rcp": ("a ReCap project", "Autodesk ReCap"),
-    ".rcs": ("a ReCap scan", "Autodesk ReCap"),
-    ".zfs": ("a Z+F scan", "Z+F LaserControl"),
-    ".zfprj": ("a project of Z+F LaserControl", "Z+F LaserControl"),
-    ".rdbx": ("a RIEGL database", "RIEGL RiSCAN PRO"),
-    ".rdb": ("a RIEGL database", "RIEGL RiSCAN PRO"),
-    ".rxp": ("a RIEGL scan", "RIEGL RiSCAN PRO"),
-    ".3dd": ("a RIEGL scan", "RIEGL RiSCAN PRO"),
-    ".tzf": ("a Trimble scan", "Trimble RealWorks"),
-    ".rwp": ("a RealWorks project", "Trimble RealWorks"),
-    ".rwcx": ("a RealWorks scan", "Trimble RealWorks"),
-    ".lgs": ("a LGSx project", "Leica Cyclone or TruView"),
-    ".lgsx": ("a LGSx project", "Leica Cyclone or TruView"),
-    ".imp": ("a Cyclone database", "Leica Cyclone"),
-    ".b2g": ("a BLK2GO scan", "Leica Cyclone REGISTER 360"),
-    ".blk": ("a BLK360 scan", "Leica Cyclone REGISTER 360"),
-    ".ptg": ("a binary Leica scan", "Leica Cyclone"),
-    ".cwprj": ("a project of Cintoo", "Cintoo"),
-    ".pod": ("a Bentley point cloud", "Bentley Pointools or Descartes"),
-    ".cl3": ("a Topcon scan", "Topcon ScanMaster"),
-    ".clr": ("a Topcon scan", "Topcon ScanMaster"),
-    ".bin": ("a file of CloudCompare", "CloudCompare"),
-    ".pcg": ("a point cloud of AutoCAD", "AutoCAD"),
-    ".isproj": ("a project of AutoCAD", "Autodesk ReCap"),
-    ".dwg": ("a drawing", "the program that made it"),
-    ".dxf": ("a drawing", "the program that made it"),
+    ".fls": "FARO SCENE",
+    ".lsproj": "FARO SCENE",
+    ".fws": "FARO SCENE",
+    ".rcp": "Autodesk ReCap",
+    ".rcs": "Autodesk ReCap",
+    ".zfs": "Z+F LaserControl",
+    ".zfprj": "Z+F LaserControl",
+    ".rdbx": "RIEGL RiSCAN PRO",
+    ".rdb": "RIEGL RiSCAN PRO",
+    ".rxp": "RIEGL RiSCAN PRO",
+    ".3dd": "RIEGL RiSCAN PRO",
+    ".tzf": "Trimble RealWorks",
+    ".rwp": "Trimble RealWorks",
+    ".rwcx": "Trimble RealWorks",
+    ".lgs": "Leica Cyclone or TruView",
+    ".lgsx": "Leica Cyclone or TruView",
+    ".imp": "Leica Cyclone",
+    ".b2g": "Leica Cyclone REGISTER 360",
+    ".blk": "Leica Cyclone REGISTER 360",
+    ".ptg": "Leica Cyclone",
+    ".cwprj": "Cintoo",
+    ".pod": "Bentley Pointools or Descartes",
+    ".cl3": "Topcon ScanMaster",
+    ".clr": "Topcon ScanMaster",
+    ".bin": "CloudCompare",
+    ".pcg": "AutoCAD",
+    ".isproj": "Autodesk ReCap",
+    ".dwg": "AutoCAD",
 }
 _ARCHIVES = {
     b"PK\x03\x04": "ZIP",
@@ -71,11 +70,10 @@ def check_not_foreign(path: Path, head: bytes) -> None:
     program = _PROGRAMS.get(marked or ending)
     if program is not None and (marked or not _may_be_text(head)):
         raise ReadError(
-            "“{name}” is {what}, which only its own program reads; export it from {program} as "
+            "“{name}” is in a format that only its own program reads; export it from {program} as "
             "{formats}.",
             name=path.name,
-            what=program[0],
-            program=program[1],
+            program=program,
             formats=_EXPORT,
         )
     if archive is not None:
@@ -85,11 +83,16 @@ def check_not_foreign(path: Path, head: bytes) -> None:
             kind=archive,
         )
     if ending in _MESHES or _is_mesh(head):
-        raise ReadError(
-            "“{name}” is a mesh: its corners are not a scan. Sample points on it first, such as "
-            "with open3d: read_triangle_mesh(…).sample_points_uniformly(1000000).",
-            name=path.name,
-        )
+        raise mesh_error(path)
+
+
+def mesh_error(path: Path) -> ReadError:
+    """Return the error of a mesh, which is no scan."""
+    return ReadError(
+        "“{name}” is a mesh: its corners are not a scan. Sample points on it first, such as with "
+        "open3d: read_triangle_mesh(…).sample_points_uniformly(1000000).",
+        name=path.name,
+    )
 
 
 def _may_be_text(head: bytes) -> bool:
