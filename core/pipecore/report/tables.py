@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pipecore.formatting import format_clock, text_cell
 from pipecore.geometry import ArcAxis
+from pipecore.inspection.section import radius_is_measurable
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.report.world import FileCoordinates
@@ -98,9 +99,16 @@ def profiles_table(result: Result) -> Table:
     Returns
     -------
     Table
-        The names and the values of ``profiles.csv``.
+        The names and the values of ``profiles.csv``. The radius, its standard deviation and
+        its deviation are nan where the radius is not the pipe's; see
+        `pipecore.inspection.section.radius_is_measurable`.
     """
     p = result.profiles
+    is_measurable = radius_is_measurable(p)
+    radius, radius_sd, radius_deviation = (
+        np.where(is_measurable, values, np.nan)
+        for values in (p.radius, p.radius_sd, p.radius_deviation)
+    )
     return Table(
         [
             _integers("element_id", p.element_id),
@@ -111,11 +119,11 @@ def profiles_table(result: Result) -> Table:
             _floats("semi_minor_mm", p.semi_minor, 1e3, 2),
             _floats("semi_major_mm", p.semi_major, 1e3, 2),
             _floats("flattening", p.flattening, 1, 5),
-            _floats("radius_mm", p.radius, 1e3, 2),
-            _floats("radius_sd_mm", p.radius_sd, 1e3, 3),
+            _floats("radius_mm", radius, 1e3, 2),
+            _floats("radius_sd_mm", radius_sd, 1e3, 3),
             _floats("ovality_pct", p.ovality, 100, 3),
             _floats("centre_deviation_mm", p.centre_deviation, 1e3, 2),
-            _floats("radius_deviation_mm", p.radius_deviation, 1e3, 2),
+            _floats("radius_deviation_mm", radius_deviation, 1e3, 2),
             _angles("arc_deg", p.arc),
             _integers("n_points", p.n_points),
             _floats("rms_mm", p.rms, 1e3, 3),

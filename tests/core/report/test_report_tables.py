@@ -124,6 +124,22 @@ def test_that_the_profiles_table_gives_back_what_was_measured(tmp_path):
     assert np.abs(centres - (p.centre + result.origin)).max() < 6e-5
 
 
+def test_that_the_radius_of_a_circle_beside_the_pipe_is_in_no_table(tmp_path):
+    result = make_result(2000)
+    p = result.profiles
+    # Every third profile sees 90°, and its circle lies half a radius off the axis.
+    is_beside = np.arange(len(p)) % 3 == 0
+    p = replace(
+        p,
+        arc=np.where(is_beside, np.pi / 2, p.arc),
+        centre_deviation=np.where(is_beside, 0.5 * p.semi_minor, p.centre_deviation),
+    )
+    rows = rows_of(write_profiles_csv, replace(result, profiles=p), tmp_path / "profiles.csv")
+    for name in ("radius_mm", "radius_sd_mm", "radius_deviation_mm"):
+        assert [row[name] == "" for row in rows] == is_beside.tolist()
+    assert all(row["semi_minor_mm"] and row["centre_deviation_mm"] for row in rows)
+
+
 def test_that_the_deformations_table_gives_back_what_was_measured(tmp_path):
     result = make_result(2000)
     rows = rows_of(write_deformations_csv, result, tmp_path / "deformations.csv")
