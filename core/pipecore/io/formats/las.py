@@ -75,7 +75,7 @@ def open_source(
             system=reader.head.system,
             guid=str(header.uuid),
             step=step if np.isfinite(step) else 0.0,
-            field_infos=_field_infos(header.point_format),
+            field_infos=_field_infos(header.point_format, reader.head.no_data),
             notes=reader.notes,
             left_out=reader.left_out,
             overview=nodes.overview if nodes else None,
@@ -275,18 +275,18 @@ class _Reader:
         }
 
 
-def _field_infos(layout: "laspy.PointFormat") -> dict[str, FieldInfo]:
+def _field_infos(layout: "laspy.PointFormat", no_data: dict[str, float]) -> dict[str, FieldInfo]:
     """How the extra bytes are stored."""
 
-    def first(values: Any, default: float | None) -> float | None:
+    def first(values: Any, default: float) -> float:
         return default if values is None or not len(values) else float(values[0])
 
     infos = {}
     for dimension in layout.extra_dimensions:
         infos[dimension.name] = FieldInfo(
             first(dimension.scales, 1.0) or 1.0,
-            first(dimension.offsets, 0.0) or 0.0,
-            first(dimension.no_data, None),
+            first(dimension.offsets, 0.0),
+            no_data.get(dimension.name),
             str(dimension.description),
         )
     return infos

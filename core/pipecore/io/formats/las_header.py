@@ -29,6 +29,9 @@ _LONGEST_EXTENDED = 1_000_000
 _KEPT = {(b"laszip encoded", 22204), (b"copc", 1), (b"LASF_Spec", 4)}
 """Records that laspy has to understand; it may fail on others."""
 _EXTRA_BYTES = 192
+_HAS_NO_DATA = 1
+_NO_DATA_KINDS = ("<Q", "<q") * 4 + ("<d", "<d")
+"""How the values that stand for none are stored, for each kind of extra value."""
 _RESERVED_NAMES = {"x", "y", "z"}
 _LAYERED_VERSIONS = (3, 4)
 _LAYERED = 3
@@ -49,6 +52,8 @@ class LasHead:
         How points are packed, as lazrs takes it; b"" if they are not.
     has_new_items : bool
         Whether points are packed in version 4, which is version 3 with one scanner channel.
+    no_data : dict of str to float
+        Stored extra values that stand for none, by name.
     notes : list of Note
         What was mended.
     """
@@ -58,6 +63,7 @@ class LasHead:
     announced: int
     packing: bytes
     has_new_items: bool = False
+    no_data: dict[str, float] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
 
 
@@ -94,7 +100,9 @@ def read_head(file: BinaryIO, path: Path) -> LasHead:
     )
     for place in (26, 58):
         _mend_text(head, place, 32)
-    contents = _mend_records(head, path, header_size, n_records, record_size, point_format)
+    no_data: dict[str, float] = {}
+    n_extra = record_size - RECORD_SIZES[point_format]
+    contents = _mend_records(head, path, header_size, n_records, n_extra, no_data)
     packing, has_new_items = _older_items(contents.get((b"laszip encoded", 22204), b""))
     found, is_whole = _extended_records(file, head, size)
     contents |= found
@@ -112,7 +120,7 @@ def read_head(file: BinaryIO, path: Path) -> LasHead:
         raise damaged(path, "LAS") from error
     if kind & _COMPRESSED and not packing:
         raise damaged(path, "LAZ", "it does not say how its points are packed")
-    return LasHead(header, _system(contents), announced, packing, has_new_items, notes)
+    return LasHead(header, _system(contents), announced, packing, has_new_items, no_data, notes)
 
 
 def _mend_records(
@@ -120,21 +128,20 @@ def _mend_records(
     path: Path,
     place: int,
     n_records: int,
-    record_size: int,
-    point_format: int,
+    n_extra: int,
+    no_data: dict[str, float],
 ) -> dict[tuple[bytes, int], bytes]:
     """Hide from laspy what it may fail on; return the contents by user and number."""
     records = list(_records(head, place, n_records))
     if len(records) < n_records:
         raise damaged(path, "LAS", "its header points beyond its end")
     contents = {}
-    n_extra = record_size - RECORD_SIZES[point_format]
     for start, user, number, length in records:
         key = user, number
         contents[key] = bytes(head[start + _RECORD_HEAD : start + _RECORD_HEAD + length])
         _mend_text(head, start + 22, 32)
         if key == (b"LASF_Spec", 4) and n_extra:
-            _mend_extra_bytes(head, start, length, n_extra)
+            no_data |= _mend_extra_bytes(head, start, length, n_extra)
         elif key not in _KEPT or key == (b"LASF_Spec", 4):
             head[start + 2 : start + 18] = b"other".ljust(16, b"\0")
     return contents
@@ -172,12 +179,16 @@ def _records(head: bytearray, place: int, n: int) -> Iterator[tuple[int, bytes, 
         place += _RECORD_HEAD + length
 
 
-def _mend_extra_bytes(head: bytearray, place: int, length: int, n_bytes: int) -> None:
-    """Give the values of points different names; drop their description if it does not fit."""
+def _mend_extra_bytes(head: bytearray, place: int, length: int, n_bytes: int) -> dict[str, float]:
+    """Give the values of points different names; drop their description if it does not fit.
+
+    Returns the stored values that stand for none, which laspy does not keep.
+    """
     import laspy  # noqa: PLC0415
 
     taken = {name.casefold() for f in range(11) for name in laspy.PointFormat(f).dimension_names}
     taken |= _RESERVED_NAMES
+    no_data: dict[str, float] = {}
     total = 0
     for at in range(place + _RECORD_HEAD, place + _RECORD_HEAD + length, _EXTRA_BYTES):
         _mend_text(head, at + 4, 32)
@@ -191,8 +202,11 @@ def _mend_extra_bytes(head: bytearray, place: int, length: int, n_bytes: int) ->
             unique = f"{name[: 31 - len(str(k))]} {k}"
         taken.add(unique.casefold())
         head[at + 4 : at + 36] = unique.encode("ascii").ljust(32, b"\0")[:32]
+        if options & _HAS_NO_DATA and 1 <= kind <= 10:
+            (no_data[unique],) = struct.unpack_from(_NO_DATA_KINDS[kind - 1], head, at + 40)
     if total > n_bytes or length % _EXTRA_BYTES:
         head[place + 2 : place + 18] = b"other".ljust(16, b"\0")
+    return no_data
 
 
 def _size_of(kind: int) -> int:
