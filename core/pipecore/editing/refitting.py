@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from pipecore.editing.changes import with_settings, without
 from pipecore.elements import NearbyPoints
 from pipecore.elements.refinement.extent import MAX_SECTORS, section_misfit
-from pipecore.elements.refinement.refine import axis_through, fit_measured
+from pipecore.elements.refinement.guess import axis_through
+from pipecore.elements.refinement.sampled_fits import fit_measured
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, Array

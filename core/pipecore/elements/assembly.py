@@ -9,8 +9,8 @@ from pipecore.catalogues import nominal_size
 from pipecore.elements.fittings.flanges import pair_flanges
 from pipecore.elements.fittings.tees import ElementPart, Junction, cut_tees, find_junctions
 from pipecore.elements.proposals import Proposal
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.elements.runs.ends import AxisSpan, End, Link, meeting_ends
 from pipecore.elements.runs.joining import join_straights

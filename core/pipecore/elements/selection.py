@@ -11,8 +11,9 @@ from pipecore.elements.fittings.straight_ends import straight_ends
 from pipecore.elements.gates.acceptance import passes_gates
 from pipecore.elements.gates.rounded_corners import is_rounded_corner
 from pipecore.elements.proposals import LONG_PIECE, Proposal
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement, refine_proposal
+from pipecore.elements.refinement.refine import refine_proposal
 from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface
 from pipecore.elements.runs.ends import End, Link
 from pipecore.elements.speculative_refinement import refine_speculatively

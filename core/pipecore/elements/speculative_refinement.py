@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pipecore import parallel
 from pipecore.elements.proposals import Proposal
-from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.progress import Progress
 
 Indices = NDArray[np.intp]

@@ -10,8 +10,8 @@ from pipecore.elements.fittings.open_ends import extend_open_end
 from pipecore.elements.fittings.straight_ends import StraightEnd
 from pipecore.elements.fittings.tees import cut_tees, find_junctions, tee_ends
 from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs.ends import AxisSpan
 from pipecore.geometry import ArcAxis, LineAxis, unit

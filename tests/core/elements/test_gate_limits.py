@@ -8,7 +8,7 @@ import pytest
 from pipecore.elements.gates import acceptance
 from pipecore.elements.gates.acceptance import GATES, failed_gate
 from pipecore.elements.refinement.extent import Extent
-from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,

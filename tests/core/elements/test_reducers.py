@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from pipecore.elements.fittings.reducers import RadiusStep, find_steps, fit_reducer
 from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.geometry import LineAxis, surface_points, unit
 from pipecore.pipeline import detect

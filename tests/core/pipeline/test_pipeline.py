@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pipecore import parallel
-from pipecore.elements.refinement.refine import MAX_FIT_POINTS
+from pipecore.elements.refinement.sampled_fits import MAX_FIT_POINTS
 from pipecore.errors import CancelledError, SettingsError
 from pipecore.geometry import LineAxis
 from pipecore.io import read

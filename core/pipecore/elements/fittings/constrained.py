@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.elements.refinement.extent import Extent, find_extent, section_misfit
+from pipecore.elements.refinement.fitted_element import FittedElement
+from pipecore.elements.refinement.guess import axis_through
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement, axis_through
 from pipecore.elements.refinement.surface_fits import (
     ArcSurface,
     LineSurface,

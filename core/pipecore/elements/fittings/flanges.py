@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pipecore.elements.refinement.extent import Extent
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import OUTER, NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs.ends import LineIndex, Link
 from pipecore.geometry import LineAxis

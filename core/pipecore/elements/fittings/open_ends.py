@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from pipecore._kernels import bend_support as kernels
 from pipecore.elements.fittings.straight_ends import NO_ELLIPSES, StraightEnd
 from pipecore.elements.proposals import Proposal, arc_angles
-from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS
+from pipecore.elements.refinement.nearby_points import RADIAL_COS, NearbyPoints
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.geometry import cross, unit
 from pipecore.robust import sample_evenly

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from pipecore.elements.fittings.constrained import FittingInliers, complete_fitting
 from pipecore.elements.fittings.straight_ends import StraightEnd, normal_angle, straight_ends
-from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import RADIAL_COS, FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
+from pipecore.elements.refinement.nearby_points import RADIAL_COS, NearbyPoints
 from pipecore.elements.refinement.surface_fits import (
     LineSurface,
     SurfaceFit,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.elements.refinement.extent import Extent
-from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.runs.ends import AxisSpan, LineIndex
 from pipecore.geometry import ArcAxis, LineAxis
 

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from pipecore.elements.gates.waviness import waviness
-from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface, SphereSurface
 from pipecore.settings import ElementSettings
 from pipecore.surface import Surface

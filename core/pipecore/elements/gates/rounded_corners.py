@@ -9,8 +9,8 @@ the pipe stands on and meets at an angle.
 import numpy as np
 from numpy.typing import NDArray
 
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
-from pipecore.elements.refinement.refine import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface
 
 Array = NDArray[np.float64]

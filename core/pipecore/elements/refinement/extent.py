@@ -64,7 +64,7 @@ def find_extent(
     chainage: Array,
     clock: Array,
     residual: Array,
-    lean: Array,
+    normal_angle: Array,
     inside: Callable[[float, float], Array],
     length: float,
     radius: float,
@@ -84,11 +84,11 @@ def find_extent(
     ----------
     chainage, clock, residual : ndarray, shape (n,)
         Of the points near the surface.
-    lean : ndarray, shape (n,)
+    normal_angle : ndarray, shape (n,)
         Angle from the surface's normal to each point's own, towards increasing clock.
     inside : callable
         Asked, only where there are gaps, for chainage and clock, shape (2, m), of the points
-        well inside the surface that face as it does, between two chainages.
+        well inside the surface whose normals agree with it, between two chainages.
     length : float
         The proposed extent is chainage 0 … `length`.
     radius, spacing, sigma : float
@@ -108,7 +108,7 @@ def find_extent(
     # Half of normal residuals are below 0.67 sigma.
     max_off = 1.2 * sigma + min(0.006 * radius, 0.0015)
     arc, covered, n_core = kernels.cover_rows(
-        chainage, clock, residual, lean, length, radius, base, step, n_sectors,
+        chainage, clock, residual, normal_angle, length, radius, base, step, n_sectors,
         (SHARE_OF_ARC, MIN_COVERED_ARC, ENOUGH_OF_ARC, max_off,
          OVAL_ARC, MAX_OVAL, OVAL_SHARE, MIN_TURNING),
     )  # fmt: skip

@@ -28,6 +28,11 @@ REACH_OF_SPHERE = 1.2
 CELL_VOXELS, COARSE = 6.0, 4
 """Edge of the cells in which points are looked up, in voxels; of coarse cells, in fine ones."""
 
+RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
+"""A point is on a surface only if its normal is this close to the surface's."""
+MIN_DEPTH_RADII = 0.1
+"""Points are well inside a surface from this depth on."""
+
 ROUGH_SAMPLE_POINTS = 20_000
 """A rough search takes about this many of the points in the cells about a surface."""
 
@@ -42,12 +47,12 @@ class PointsOnSurface:
     Parameters
     ----------
     inliers : ndarray of int, shape (n,)
-    residual, chainage, clock, lean : ndarray, shape (n,)
+    residual, chainage, clock, normal_angle : ndarray, shape (n,)
         Distance from the surface, pipe coordinates, and the angle from the surface's normal
         to the point's own, towards increasing clock.
     inside : callable
         Takes the chainages between which it is asked for, and returns chainage and clock of
-        the points well inside the surface that face as it does, shape (2, m).
+        the points well inside the surface whose normals agree with it, shape (2, m).
     spacing : float
         Distance between neighbours among the points looked at, metres.
     """
@@ -56,7 +61,7 @@ class PointsOnSurface:
     residual: Array
     chainage: Array
     clock: Array
-    lean: Array
+    normal_angle: Array
     inside: Callable[[float, float], Array]
     spacing: float
 
@@ -70,7 +75,7 @@ class PointsOnSurface:
             residual=residual[on],
             chainage=self.chainage[on],
             clock=self.clock[on],
-            lean=self.lean[on],
+            normal_angle=self.normal_angle[on],
         )
 
 
@@ -194,8 +199,8 @@ class NearbyPoints:
             found: Array = point_search.points_inside(points, self._grid, cells, part, target)
             return found
 
-        residual, chainage, clock, lean = columns
-        return PointsOnSurface(own, residual, chainage, clock, lean, look_inside, spacing)
+        residual, chainage, clock, normal_angle = columns
+        return PointsOnSurface(own, residual, chainage, clock, normal_angle, look_inside, spacing)
 
     def on_sphere(
         self,

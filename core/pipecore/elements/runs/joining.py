@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII, Extent
-from pipecore.elements.refinement.refine import FittedElement
+from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs.ends import AxisSpan, Link, meeting_ends
 from pipecore.elements.runs.numbering import number_runs
