@@ -119,7 +119,7 @@ class GrowingCloud:
     def add(self, chunk: Chunk) -> None:
         """Append the valid points of a chunk."""
         path, source = self._files[-1]
-        xyz, keep = self._screen.valid(chunk, source.left_out)
+        xyz, keep, (low, high) = self._screen.valid(chunk, source.left_out)
         if not len(xyz):
             return
         if self.origin is None:
@@ -130,13 +130,14 @@ class GrowingCloud:
             self._notes += notes
             self._step = max(self._step, step)
         assert self._whereabouts is not None
-        self._whereabouts.add(xyz)
-        self._append(xyz, chunk if isinstance(keep, slice) else chunk.take(keep))
+        self._whereabouts.add(xyz, low, high)
+        self._append(xyz, low, high, chunk if isinstance(keep, slice) else chunk.take(keep))
 
-    def _append(self, xyz: Array, chunk: Chunk) -> None:
+    def _append(self, xyz: Array, low: Array, high: Array, chunk: Chunk) -> None:
         assert self.origin is not None
         local, n, start = xyz - self.origin, len(xyz), self.n_points
-        if self.xyz.array.dtype == np.float32 and np.abs(local).max() > FLOAT32_REACH:
+        reach = np.maximum(self.origin - low, high - self.origin).max()
+        if self.xyz.array.dtype == np.float32 and reach > FLOAT32_REACH:
             self._widen_coordinates()
         self.xyz.put(start, local, n)
         if chunk.intensity is not None:
@@ -172,7 +173,7 @@ class GrowingCloud:
         _, source = self._files[-1]
         bounds = self._whereabouts.bounds() if self._whereabouts is not None else None
         for chunk in self._screen.keep_zeros(bounds, source.left_out):
-            self._append(self._screen.world(chunk.xyz), chunk)
+            self._append(self._screen.world(chunk.xyz), np.zeros(3), np.zeros(3), chunk)
 
     def _widen_coordinates(self) -> None:
         """Go over to float64."""
@@ -188,7 +189,7 @@ class GrowingCloud:
         for start in range(0, self.n_points, CHUNK_POINTS):
             stop = min(start + CHUNK_POINTS, self.n_points)
             self.xyz.put(start, old[start:stop], stop - start)
-        (self._folder / f"xyz.{old.dtype.name}").unlink()
+        (self._folder / f"xyz.{old.dtype.name}").unlink(missing_ok=True)
 
     def of_chunk(self, chunk: Chunk) -> PointCloud:
         """Return the points of a chunk that is not added, as a cloud with the same origin."""

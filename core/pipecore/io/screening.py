@@ -31,6 +31,14 @@ def has_zeros(xyz: Array) -> bool:
     return bool(is_zero.any()) and not bool(xyz[is_zero, 1:].any(axis=1).all())
 
 
+def extremes(xyz: Array) -> Bounds:
+    """Lowest and highest coordinates of points, shape (m, 3); infinite if there are none."""
+    # An axis at a time: a third of the time of all three along the rows.
+    axes = [xyz[:, i] for i in range(3)]
+    low = np.array([a.min(initial=np.inf) for a in axes])
+    return low, np.array([a.max(initial=-np.inf) for a in axes])
+
+
 @dataclass
 class Screen:
     """Takes the valid points of chunks, and counts what it leaves out.
@@ -56,8 +64,8 @@ class Screen:
         """File coordinates in metres."""
         return xyz if (self.factors == 1.0).all() else xyz * self.factors
 
-    def valid(self, chunk: Chunk, left_out: Counter[str]) -> tuple[Array, Rows]:
-        """World coordinates in metres of the points to keep, and which points they are.
+    def valid(self, chunk: Chunk, left_out: Counter[str]) -> tuple[Array, Rows, Bounds]:
+        """World coordinates in metres of the points to keep, which they are, their extremes.
 
         Those at 0, 0, 0 are held back: see `keep_zeros`.
         """
@@ -70,8 +78,9 @@ class Screen:
             self._hold_back(chunk, is_zero if is_kept is None else is_zero & is_kept)
             is_kept = ~is_zero if is_kept is None else is_kept & ~is_zero
         xyz = self.world(raw)
-        if is_kept is None and (not len(xyz) or (xyz.min() >= -FARTHEST and xyz.max() <= FARTHEST)):
-            return xyz, slice(None)
+        low, high = extremes(xyz)
+        if is_kept is None and (low >= -FARTHEST).all() and (high <= FARTHEST).all():
+            return xyz, slice(None), (low, high)
         with np.errstate(invalid="ignore"):
             is_valid = np.all(np.abs(xyz) <= FARTHEST, axis=1)
         if not is_valid.all():
@@ -80,7 +89,8 @@ class Screen:
             left_out[NO_NUMBER] += n_nan
             left_out[ABSURD] += n_bad - n_nan
         is_kept = is_valid if is_kept is None else is_valid & is_kept
-        return xyz[is_kept], is_kept
+        xyz = xyz[is_kept]
+        return xyz, is_kept, extremes(xyz)
 
     def _hold_back(self, chunk: Chunk, is_zero: NDArray[np.bool_]) -> None:
         if not is_zero.any():
@@ -117,11 +127,8 @@ class Whereabouts:
         self._origin = origin
         self._cubes: dict[tuple[int, ...], tuple[int, Array, Array]] = {}
 
-    def add(self, xyz: Array) -> None:
-        """Count points, world coordinates in metres, shape (m, 3)."""
-        if not len(xyz):
-            return
-        low, high = xyz.min(axis=0), xyz.max(axis=0)
+    def add(self, xyz: Array, low: Array, high: Array) -> None:
+        """Count points, world coordinates in metres, shape (m, 3), with their extremes."""
         if (np.abs(low - self._origin) < FLOAT32_REACH).all() and (
             np.abs(high - self._origin) < FLOAT32_REACH
         ).all():

@@ -173,7 +173,7 @@ class _Survey:
 
     def add(self, chunk: Chunk) -> None:
         """Look at a chunk."""
-        xyz, keep = self._screen.valid(chunk, self._source.left_out)
+        xyz, keep, extremes = self._screen.valid(chunk, self._source.left_out)
         if not len(xyz):
             return
         if self._whereabouts is None:
@@ -181,7 +181,7 @@ class _Survey:
             self._notes = coordinates.notes_on_steps(
                 self._path, self._source, chunk.xyz[keep], self._unit
             )[0]
-        self._whereabouts.add(xyz)
+        self._whereabouts.add(xyz, *extremes)
         self._count(chunk if isinstance(keep, slice) else chunk.take(keep))
         if self._n_sample < SAMPLE_POINTS:
             self.sample.append(chunk.xyz[keep][: SAMPLE_POINTS - self._n_sample])

@@ -249,3 +249,13 @@ def test_that_parts_are_shown_as_soon_as_they_are_read(
     assert cloud.rgb is not None
     shown = [part.rgb for part in parts if part.rgb is not None]
     assert np.array_equal(np.concatenate(shown), cloud.rgb[rows])
+
+
+def test_that_a_wide_text_is_kept_in_files_too(tmp_path: Path, rng: np.random.Generator) -> None:
+    # Its number of points is not known, and its first chunk already needs float64.
+    xyz = rng.uniform(0, 3000, (500, 3))
+    folder = tmp_path / "kept"
+    folder.mkdir()
+    cloud = io.read(write_text(tmp_path / "a.xyz", xyz), folder=folder)
+    assert cloud.xyz.dtype == np.float64
+    assert np.abs(cloud.world(cloud.xyz) - xyz).max() < 1e-4

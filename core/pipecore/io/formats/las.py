@@ -182,9 +182,10 @@ class _Reader:
         for first in range(rows[0], rows[1], CHUNK_POINTS):
             n = min(CHUNK_POINTS, rows[1] - first)
             self.file.seek(start + first * layout.size)
-            raw = bytearray(self.file.read(n * layout.size))
-            if len(raw) < n * layout.size:
-                raise truncated(self.path, self.head.announced, first + len(raw) // layout.size)
+            raw = np.empty(n * layout.size, np.uint8)
+            n_bytes = self.file.readinto(raw)  # type: ignore[attr-defined]
+            if n_bytes < len(raw):
+                raise truncated(self.path, self.head.announced, first + n_bytes // layout.size)
             yield laspy.PackedPointRecord.from_buffer(raw, layout)
 
     def _records_in_order(self) -> Iterator[Any]:
@@ -222,7 +223,8 @@ class _Reader:
     def chunk_of(self, points: Any, fraction: float) -> Chunk:
         """The chunk of some points, without those that the file marks."""
         header, layout = self.head.header, self.head.header.point_format
-        is_bad = self._marked(points)
+        classes = np.asarray(points["classification"], dtype=np.uint8)
+        is_bad = self._marked(points, classes)
         xyz = np.empty((len(points), 3))
         with np.errstate(all="ignore"):  # A damaged header's scales may be anything.
             for axis, name in enumerate("XYZ"):
@@ -236,19 +238,18 @@ class _Reader:
             fraction,
             intensity=np.asarray(points["intensity"], dtype=np.float32),
             rgb=rgb,
-            classification=np.asarray(points["classification"], dtype=np.uint8),
+            classification=classes,
             station=np.asarray(points["point_source_id"]),
             fields=self._fields(points) if self.options.has_fields else {},
         )
         return chunk if is_bad is None else chunk.take(~is_bad)
 
-    def _marked(self, points: Any) -> NDArray[np.bool_] | None:
+    def _marked(self, points: Any, classes: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
         """Which points the file marks as none, and counts of why; None if no point is."""
         is_new = self.head.header.point_format.id >= 6
         is_bad: NDArray[np.bool_] | None = None
         marks = []
         if self.options.flagged_points is FlaggedPoints.LEAVE_OUT:
-            classes = np.asarray(points["classification"])
             flags = np.asarray(points["classification_flags" if is_new else "raw_classification"])
             is_noise = classes == _LOW_NOISE
             if is_new:
