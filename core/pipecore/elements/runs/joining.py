@@ -87,7 +87,8 @@ def _joined(parts: list[FittedElement]) -> FittedElement:
     best = max(parts, key=lambda p: p.fit.n_used).fit
     covariance = best.covariance.copy()
     covariance[4, 4] = 1.0 / precision.sum()
-    off_line = np.sqrt(weight @ (np.square(centred).sum(axis=1) - along**2))
+    # Never below zero, where parts are on one line but for rounding.
+    off_line = np.sqrt(max(weight @ (np.square(centred).sum(axis=1) - along**2), 0.0))
     fit = SurfaceFit(
         model,
         covariance,
