@@ -18,5 +18,18 @@ class Allocate(Protocol):
 
 
 def in_memory(name: str, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Make an array in memory."""
+    """Allocate an array in memory.
+
+    Parameters
+    ----------
+    name : str
+        Not used.
+    shape : tuple of int
+    dtype : dtype_like
+
+    Returns
+    -------
+    ndarray
+        Of zeros.
+    """
     return np.zeros(shape, dtype)

@@ -19,22 +19,51 @@ VERTICAL_COS = np.cos(np.deg2rad(15.0))
 
 
 def unit(vector: ArrayLike) -> Array:
-    """Return `vector` scaled to length one."""
+    """Return `vector` scaled to length one.
+
+    Parameters
+    ----------
+    vector : array_like, shape (n,)
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
     v = np.asarray(vector, dtype=np.float64)
     return v / np.linalg.norm(v)
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product of two vectors, shape (3,): np.cross takes fifty times as long for so few."""
+    """Return the cross product of two vectors.
+
+    `np.cross` takes fifty times as long for a single pair.
+
+    Parameters
+    ----------
+    a, b : ndarray, shape (3,)
+
+    Returns
+    -------
+    ndarray, shape (3,)
+    """
     x, y, z = a.tolist()
     u, v, w = b.tolist()
     return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def twelve_o_clock(tangent: Array) -> Array:
-    """Return the unit vector across `tangent` (shape (3,), unit) that points to 12:00.
+    """Return the unit vector across `tangent` that points to 12:00.
 
-    Up (+Z) made perpendicular to the tangent; grid north (+Y) for a vertical tangent.
+    It is up (+Z) made perpendicular to the tangent; grid north (+Y) for a vertical tangent.
+
+    Parameters
+    ----------
+    tangent : ndarray, shape (3,)
+        Unit vector along an axis.
+
+    Returns
+    -------
+    ndarray, shape (3,)
     """
     reference = np.array([0.0, 1.0, 0.0] if abs(tangent[2]) > VERTICAL_COS else [0.0, 0.0, 1.0])
     return unit(reference - (reference @ tangent) * tangent)
@@ -115,7 +144,17 @@ def _polar(up_part: Array, right_part: Array) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class LineAxis:
-    """A straight axis from `start` along the unit vector `direction` for `length` metres."""
+    """A straight axis, as a pipe or a reducer has it.
+
+    Parameters
+    ----------
+    start : ndarray, shape (3,)
+        Point at chainage zero.
+    direction : ndarray, shape (3,)
+        Unit vector towards increasing chainage.
+    length : float
+        Metres.
+    """
 
     start: Array
     direction: Array

@@ -18,7 +18,13 @@ _n_threads = os.cpu_count() or 1
 
 
 def set_threads(n_threads: int) -> None:
-    """Set how many threads kernels may use."""
+    """Set the number of threads that kernels use.
+
+    Parameters
+    ----------
+    n_threads : int
+        At least one is used.
+    """
     global _n_threads  # noqa: PLW0603 - one setting of the process, like numba's own
     _n_threads = max(1, n_threads)
     # Heard by the compressor of LAZ if it has not begun yet.
@@ -26,7 +32,12 @@ def set_threads(n_threads: int) -> None:
 
 
 def threads() -> int:
-    """How many threads kernels may use."""
+    """Return the number of threads that kernels use.
+
+    Returns
+    -------
+    int
+    """
     return _n_threads
 
 
@@ -72,8 +83,20 @@ def for_items(
 ) -> None:
     """Call `work(item, check)` for each of `n_items`, in threads.
 
-    As `for_chunks`; `check` is to be called now and then by work that takes long: it
-    raises where the work is cancelled.
+    Items must be independent, as the chunks of `for_chunks`.
+
+    Parameters
+    ----------
+    work : callable
+        Takes an item's number and `check`, which is to be called now and then by work that takes
+        long: it raises where the work is cancelled.
+    n_items : int
+    stage : str
+        Reported to `progress` after each item.
+    progress : Progress
+        If it raises, the remaining items are dropped.
+    span : (float, float)
+        Which part of the stage's fraction these items are.
     """
     begin, end = span
     progress.update(stage, begin)
@@ -111,7 +134,17 @@ def pool() -> Iterator[ThreadPoolExecutor]:
 
 
 def wait_for(work: Future[Any], stage: str, progress: Progress, fraction: float) -> None:
-    """Wait until some work is done, with progress and cancel."""
+    """Wait until submitted work is done, with progress and cancel.
+
+    Parameters
+    ----------
+    work : Future
+    stage : str
+    progress : Progress
+        Updated while waiting; if it raises, the wait ends.
+    fraction : float
+        Reported of the stage.
+    """
     progress.update(stage, fraction)
     while not wait([work], HEARTBEAT).done:
         progress.update(stage, fraction)

@@ -73,7 +73,24 @@ def detect(
 
 
 def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> Result:
-    """Find the elements of a workspace's cloud and their deformations; see `detect`."""
+    """Find the elements of a workspace's cloud and their deformations; see `detect`.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Holds the cloud in memory or in tiles.
+    settings : Settings
+    progress : Progress
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    CancelledError, SettingsError
+        See `detect`.
+    """
     cloud, timer = workspace.cloud, StepTimer()
     rule = load_rule(settings.deformation.rule)
     if len(cloud) == 0:
@@ -152,7 +169,20 @@ def _empty_result(cloud: PointCloud, settings: Settings) -> Result:
 def judge_deformations(
     deformations: tuple[Deformation, ...], elements: tuple[Element, ...], rule: Rule
 ) -> tuple[Deformation, ...]:
-    """Number the deformations, relate them to their surroundings, judge them by a rule."""
+    """Number the deformations, relate them to their surroundings, judge them by a rule.
+
+    Parameters
+    ----------
+    deformations : tuple of Deformation
+    elements : tuple of Element
+        All, in the order of their ids.
+    rule : Rule
+
+    Returns
+    -------
+    tuple of Deformation
+        With ids from 1, neighbours, rule and verdict.
+    """
     numbered = [replace(d, deformation_id=i) for i, d in enumerate(deformations, start=1)]
     return tuple(
         replace(d, rule=rule.name, verdict=judge(d, elements[d.element_id - 1], rule))

@@ -231,6 +231,10 @@ def preview_profile(
     stack : Stack
     profile_index : int
     progress : Progress
+
+    Returns
+    -------
+    ProfilePreview
     """
     margin = WIDEST_NEIGHBOURHOOD * plan.voxel
     slab = cloud.xyz[_slab(cloud, stack, profile_index, margin, progress)]

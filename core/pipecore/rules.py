@@ -151,7 +151,16 @@ class Criterion:
 class Rule:
     """An acceptance rule with its source.
 
-    `name` is what the setting calls it (its file's name), `title` what a person does.
+    Parameters
+    ----------
+    name : str
+        What the setting calls it: its file's name without ending.
+    title : str
+        What a person calls it.
+    source : str
+        The code or standard that the limits are from.
+    note : str
+    criteria : tuple of Criterion
     """
 
     name: str
@@ -197,9 +206,20 @@ def ovality_sd(deformation: Deformation) -> float:
 
 
 def judge(deformation: Deformation, element: Element, rule: Rule) -> Verdict:
-    """Return what `rule` says of a deformation on its element: the worst of its criteria.
+    """Return the verdict of a rule on a deformation: the worst of those of its criteria.
 
-    A deformation that the rule says nothing about is for a person to review.
+    A deformation that no criterion covers is to be reviewed by a person.
+
+    Parameters
+    ----------
+    deformation : Deformation
+    element : Element
+        On which it is.
+    rule : Rule
+
+    Returns
+    -------
+    Verdict
     """
     verdicts = {
         criterion.judge(deformation, element)
@@ -257,13 +277,27 @@ def dent_limit(element: Element, rule: Rule) -> DentLimit | None:
 
 
 def list_rules() -> tuple[Rule, ...]:
-    """Return the rules that come with the program, by name."""
+    """Return the rules that come with the program, by name.
+
+    Returns
+    -------
+    tuple of Rule
+    """
     rules = (_read(path) for path in resource("rules").glob("*.toml"))
     return tuple(sorted(rules, key=lambda rule: rule.name))
 
 
 def load_rule(name: str) -> Rule:
-    """Return a rule by the name of one that comes with the program, or by a file's path.
+    """Read an acceptance rule by its name or from a file.
+
+    Parameters
+    ----------
+    name : str
+        Name of a rule that comes with the program, or path of a file that ends in ``.toml``.
+
+    Returns
+    -------
+    Rule
 
     Raises
     ------

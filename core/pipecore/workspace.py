@@ -235,6 +235,15 @@ Item = TypeVar("Item")
 
 
 def with_spans(items: Sequence[Item]) -> Iterator[tuple[Item, tuple[float, float]]]:
-    """Yield each item with the part of its stage that it is, from 0 to 1."""
+    """Iterate over items, each with the part of its stage that it is, from 0 to 1.
+
+    Parameters
+    ----------
+    items : sequence
+
+    Returns
+    -------
+    iterator of (item, (float, float))
+    """
     for i, item in enumerate(items):
         yield item, (i / len(items), (i + 1) / len(items))

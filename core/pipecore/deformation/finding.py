@@ -100,6 +100,10 @@ def find_deformations(
     neighbours : sequence of Element
         Elements whose surfaces come near: where they touch, nothing is called a bulge.
     settings : DeformationSettings
+
+    Returns
+    -------
+    DeformationFinding
     """
     points = unroll(element, xyz, normals)
     surface = find_element_surface(element, points)

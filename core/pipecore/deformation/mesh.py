@@ -62,6 +62,11 @@ def mesh_surface(
         By which deviations are drawn larger.
     name : str
 
+    Returns
+    -------
+    SurfaceMesh
+        Without vertices where fewer than three points lie on the stretch.
+
     Notes
     -----
     A vertex is the mean over 3 × 3 cells of about the points' spacing. Where no points
@@ -154,6 +159,10 @@ def mesh_deformations(
         All if None.
     exaggeration : float
         By which deviations are drawn larger.
+
+    Returns
+    -------
+    list of SurfaceMesh
     """
     chosen = [
         d

@@ -104,6 +104,11 @@ def relate_deformations(
         With their ids.
     elements : sequence of Element
         All, in the order of their ids.
+
+    Returns
+    -------
+    tuple of Deformation
+        In the order given.
     """
     by_id = {e.element_id: e for e in elements}
     runs = {by_id[d.element_id].run_id for d in deformations}

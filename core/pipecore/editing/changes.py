@@ -24,7 +24,17 @@ NOT_RELATED: dict[str, Any] = {
 
 
 def delete_elements(result: Result, element_ids: Collection[int]) -> Result:
-    """Take elements away, with their profiles and deformations.
+    """Delete elements with their profiles and deformations; their points belong to none.
+
+    Parameters
+    ----------
+    result : Result
+    element_ids : collection of int
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------
@@ -37,7 +47,25 @@ def delete_elements(result: Result, element_ids: Collection[int]) -> Result:
 
 
 def name_element(result: Result, element_id: int, name: str) -> Result:
-    """Call an element by a name; "" goes back to its kind and number."""
+    """Set the name of an element; "" restores its kind and number.
+
+    Parameters
+    ----------
+    result : Result
+    element_id : int
+    name : str
+        Spaces at its ends and repeated ones are removed.
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
+
+    Raises
+    ------
+    EditError
+        If there is no such element.
+    """
     element = find(result, element_id)
     name = " ".join(name.split())
     renamed = with_element(result, replace(element, name=name))
@@ -45,7 +73,19 @@ def name_element(result: Result, element_id: int, name: str) -> Result:
 
 
 def name_run(result: Result, run_id: int, name: str) -> Result:
-    """Call a run by a name; "" goes back to its number.
+    """Set the name of a run; "" restores its number.
+
+    Parameters
+    ----------
+    result : Result
+    run_id : int
+    name : str
+        Spaces at its ends and repeated ones are removed.
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------
@@ -61,10 +101,24 @@ def name_run(result: Result, run_id: int, name: str) -> Result:
 
 
 def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) -> Result:
-    """Say which catalogue size an element has; its deformations are judged anew.
+    """Set the catalogue size of an element and judge its deformations again.
+
+    Parameters
+    ----------
+    result : Result
+    element_id : int
+    size : NominalSize or None
+        None for no nominal size.
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------
+    EditError
+        If there is no such element.
     SettingsError
         If the acceptance rule is no longer there.
     """
@@ -80,7 +134,16 @@ def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) 
 
 
 def kinds_of(element: Element) -> tuple[ElementKind, ...]:
-    """What an element may be called without leaving its axis: its own kind is among them."""
+    """Return the kinds that an element with its axis can have, its own among them.
+
+    Parameters
+    ----------
+    element : Element
+
+    Returns
+    -------
+    tuple of ElementKind
+    """
     if element.kind is ElementKind.SPHERE:
         return (ElementKind.SPHERE,)
     if isinstance(element.axis, LineAxis):

@@ -24,12 +24,40 @@ SAME = 0.3
 
 
 def points_around(cloud: PointCloud, result: Result, element_ids: list[int]) -> Indices:
-    """Indices of the points around some elements: what touches them is among them."""
+    """Return the indices of the points around elements, those of what touches them included.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        The cloud that the result is of.
+    result : Result
+    element_ids : list of int
+
+    Returns
+    -------
+    ndarray of int
+
+    Raises
+    ------
+    EditError
+        If there is no such element.
+    """
     return points_near(cloud, [find(result, i) for i in element_ids])
 
 
 def points_in_box(cloud: PointCloud, low: tuple[float, ...], high: tuple[float, ...]) -> Indices:
-    """Indices of the points in an upright box in local coordinates."""
+    """Return the indices of the points in a box along the axes of coordinates.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    low, high : tuple of float
+        Lowest and highest corner, local coordinates, metres.
+
+    Returns
+    -------
+    ndarray of int
+    """
     return np.flatnonzero(in_box(cloud, np.asarray(low), np.asarray(high)))
 
 
@@ -57,6 +85,11 @@ def detect_again(
     progress : Progress
     replaced : collection of int, optional
         Ids of the elements to be replaced, where others in the part are to stay.
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------

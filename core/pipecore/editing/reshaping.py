@@ -34,9 +34,24 @@ def merge_elements(
     element_ids: Collection[int],
     progress: Progress = NoProgress(),
 ) -> Result:
-    """Make one element of several on one line or one arc, such as a pipe behind an obstacle.
+    """Merge elements on one line or one arc, such as a pipe behind an obstacle.
 
-    It takes the lowest of their ids, the name of the first that has one, and joins their runs.
+    The merged element has the lowest of their ids and the name of the first that has one;
+    their runs are joined.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        The cloud that the result is of.
+    result : Result
+    element_ids : collection of int
+        Two or more.
+    progress : Progress
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------
@@ -91,7 +106,22 @@ def split_element(
     chainage: float,
     progress: Progress = NoProgress(),
 ) -> Result:
-    """Make two elements of one, cut at a chainage; the part before it keeps the id.
+    """Split an element at a chainage; the part before it keeps the id.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        The cloud that the result is of.
+    result : Result
+    element_id : int
+    chainage : float
+        Where to cut, metres from the element's start.
+    progress : Progress
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------
@@ -145,7 +175,22 @@ def change_kind(
     kind: ElementKind,
     progress: Progress = NoProgress(),
 ) -> Result:
-    """Say what an element is; it is measured anew as that.
+    """Set the kind of an element and measure it again as that.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+        The cloud that the result is of.
+    result : Result
+    element_id : int
+    kind : ElementKind
+        One of `kinds_of`.
+    progress : Progress
+
+    Returns
+    -------
+    Result
+        With the change noted in `edits`.
 
     Raises
     ------

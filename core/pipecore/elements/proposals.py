@@ -98,7 +98,7 @@ class _Rows:
 def propose_surfaces(
     ellipses: Ellipses, chain: NDArray[np.int32], progress: Progress
 ) -> list[Proposal]:
-    """Explain the ellipses by pieces of spheres, straight pipes, bends and reducers.
+    """Propose spheres, straight pipes, reducers and bends that explain the ellipses.
 
     Parameters
     ----------
@@ -106,6 +106,11 @@ def propose_surfaces(
     chain : ndarray of int32
         Chain of each ellipse.
     progress : Progress
+
+    Returns
+    -------
+    list of Proposal
+        Spheres first, then chain by chain.
     """
     order = np.argsort(chain, kind="stable")
     rows = _Rows(

@@ -5,7 +5,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def radius_sd_factor(arc: ArrayLike) -> NDArray[np.float64]:
-    """Standard deviation of a fitted radius in units of σ/√n, for n points evenly over `arc`.
+    """Return the standard deviation of a fitted radius in units of σ/√n, for n points on an arc.
 
     The Cramér-Rao bound of a circle with free centre: 1.0 for the full circle, 1.33 at
     240°, 2.3 at 180°, 5.6 at 120°.
@@ -13,7 +13,12 @@ def radius_sd_factor(arc: ArrayLike) -> NDArray[np.float64]:
     Parameters
     ----------
     arc : array_like
-        Radians.
+        Length of the arc over which the points are spread evenly, radians.
+
+    Returns
+    -------
+    ndarray
+        In the shape of `arc`.
     """
     half = np.clip(np.asarray(arc, dtype=np.float64) / 2, 1e-3, np.pi)
     mean = np.sin(half) / half

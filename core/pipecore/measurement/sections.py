@@ -129,10 +129,21 @@ def cut_normal_stack(
 
 
 def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Profiles:
-    """Rows of the stacks' ellipses, each with the element whose surface it cuts.
+    """Tabulate the stacks' ellipses by the elements whose surfaces they cut.
 
-    An ellipse is an element's if its centre lies on the axis, its direction along it and
-    its radius is the element's there.
+    An ellipse belongs to an element if its centre is near the axis, its direction along it and
+    its radius near the element's there.
+
+    Parameters
+    ----------
+    elements : tuple of Element
+    ellipses : Ellipses
+        Of all stacks.
+
+    Returns
+    -------
+    Profiles
+        Element by element; of each in the order of stack and chainage.
     """
     tables = []
     free = np.ones(len(ellipses), np.bool_)

@@ -143,6 +143,10 @@ def segment_profiles(
     progress : Progress
     span : (float, float)
         Which part of the stage "profiles" this is.
+
+    Returns
+    -------
+    Curves
     """
     frame = stack_frame(stack.direction)
     portions = cut_portions(
@@ -167,16 +171,18 @@ def cut_portions(
 
     Parameters
     ----------
-    surface, stack, settings, max_radius, progress, span
-        As there.
+    surface, stack, settings, max_radius
+        See `segment_profiles`.
     make : callable
-        Makes what is wanted of a portion's curves, in its thread; also given what it is to call
-        now and then where that takes long.
+        Takes a portion's curves, in its thread, and a function that it is to call now and then
+        where it takes long.
+    progress, span
+        See `segment_profiles`.
 
     Returns
     -------
     list
-        What was made, in the order of the profiles; of no curves where the stack cuts nothing.
+        What `make` returned, in the order of the profiles; of no curves where nothing is cut.
     """
     begin, end = span
     progress.update("profiles", begin)

@@ -25,7 +25,17 @@ SPARSE = 1.25
 
 
 def preset_directions(preset: DirectionPreset) -> list[NDArray[np.float64]]:
-    """Directions of a preset that does not depend on the cloud."""
+    """Return the directions of a preset.
+
+    Parameters
+    ----------
+    preset : DirectionPreset
+
+    Returns
+    -------
+    list of ndarray, shape (3,)
+        Unit vectors; none for presets that depend on the cloud.
+    """
     match preset:
         case DirectionPreset.AXES:
             return list(AXES)
@@ -52,6 +62,10 @@ def choose_stacks(
     max_radius : float
         Largest radius looked for, metres.
     progress : Progress
+
+    Returns
+    -------
+    tuple of Stack
 
     Raises
     ------

@@ -102,6 +102,14 @@ def fit_planes(
     The neighbourhood reaches at most `WIDEST_NEIGHBOURHOOD` voxels; what lies beyond does
     not change a bit of the result.
 
+    Parameters
+    ----------
+    points : ndarray, shape (m, 3)
+        Downsampled points, metres.
+    voxel : float
+        Edge of the voxels, metres.
+    progress : Progress
+
     Returns
     -------
     normals : ndarray, shape (m, 3)
@@ -126,7 +134,17 @@ def fit_planes(
 
 
 def estimate_normals(downsampled: DownsampledCloud, progress: Progress) -> Surface:
-    """Give downsampled points the normals, spacing and noise of their neighbourhoods."""
+    """Estimate normals, spacing and noise from the neighbourhoods of downsampled points.
+
+    Parameters
+    ----------
+    downsampled : DownsampledCloud
+    progress : Progress
+
+    Returns
+    -------
+    Surface
+    """
     normals, residuals, spacing = fit_planes(downsampled.xyz, downsampled.voxel, progress)
     known = np.isfinite(residuals).any()
     noise = float(np.nanquantile(residuals, NOISE_QUANTILE)) if known else np.nan
@@ -141,5 +159,16 @@ def estimate_normals(downsampled: DownsampledCloud, progress: Progress) -> Surfa
 
 
 def sample_surface(cloud: PointCloud, settings: ThinningSettings, progress: Progress) -> Surface:
-    """Thin `cloud` and estimate the normals of the downsampled points."""
+    """Downsample a cloud and estimate the normals of its downsampled points.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : ThinningSettings
+    progress : Progress
+
+    Returns
+    -------
+    Surface
+    """
     return estimate_normals(downsample(cloud, settings, progress), progress)

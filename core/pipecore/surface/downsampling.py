@@ -42,10 +42,20 @@ class DownsampledCloud:
 def downsample(
     cloud: PointCloud, settings: ThinningSettings, progress: Progress
 ) -> DownsampledCloud:
-    """Average the points of `cloud` in voxels.
+    """Average the points of a cloud in voxels.
 
     The voxels' edge is the setting's, or the median spacing of the points where that is
     automatic. The result does not depend on the order of the points.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : ThinningSettings
+    progress : Progress
+
+    Returns
+    -------
+    DownsampledCloud
     """
     progress.update("thinning", 0.0)
     edge = settings.voxel_mm / 1e3 or max(
@@ -57,9 +67,21 @@ def downsample(
 def average_voxels(
     xyz: NDArray[np.floating], edge: float, progress: Progress = NoProgress()
 ) -> DownsampledCloud:
-    """Average points (n, 3) in voxels of `edge` metres.
+    """Average points in voxels.
 
-    All points of some voxels give the same means as they do among those of other voxels.
+    The mean of a voxel does not depend on points in other voxels.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Local coordinates, metres.
+    edge : float
+        Edge of the voxels, metres.
+    progress : Progress
+
+    Returns
+    -------
+    DownsampledCloud
     """
     frame = GridFrame.of(xyz, edge)
     order, starts = sort_into_cells(xyz, frame, "thinning", progress, (0.1, 0.8))

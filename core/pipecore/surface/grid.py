@@ -17,10 +17,21 @@ CHUNK = 1_000_000
 
 
 def cells_of(values: NDArray[np.floating], edge: float) -> Array:
-    """Whole number of the cell of each coordinate: cells begin at multiples of `edge`.
+    """Return the number of the cell of each coordinate: cells begin at multiples of `edge`.
 
-    They do not depend on what else is in the cloud, so that a part of it is divided as the
-    whole is.
+    Cells do not depend on the other points, so that a part of a cloud is divided as the whole.
+
+    Parameters
+    ----------
+    values : ndarray
+        Coordinates, metres.
+    edge : float
+        Metres.
+
+    Returns
+    -------
+    ndarray
+        Whole numbers as float64, in the shape of `values`.
     """
     return np.floor(values.astype(np.float64) / edge)
 

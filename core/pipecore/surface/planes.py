@@ -160,6 +160,14 @@ def planes_of_points(
 ) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
     """Find the plane of each point of a surface and whether profiles are cut there.
 
+    Parameters
+    ----------
+    xyz, normals : ndarray, shape (n, 3)
+        Downsampled points, metres, and their unit normals.
+    voxel, max_radius : float
+        Edge of the voxels and largest radius of a pipe, metres.
+    progress : Progress
+
     Returns
     -------
     plane : ndarray of int32, shape (n,)

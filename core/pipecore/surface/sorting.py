@@ -22,7 +22,17 @@ BIN_BITS = 16
 
 
 def index_type(n: int) -> type[np.int32] | type[np.int64]:
-    """Type of positions among `n` things and of how many they are."""
+    """Return the integer type for indices of `n` items and for their number.
+
+    Parameters
+    ----------
+    n : int
+
+    Returns
+    -------
+    type
+        int32 where that is enough, int64 otherwise.
+    """
     return np.int32 if n < 2**31 else np.int64
 
 

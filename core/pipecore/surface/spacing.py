@@ -22,11 +22,26 @@ def median_spacing(
     among: NDArray[np.bool_] | None = None,
     progress: Progress = NoProgress(),
 ) -> float:
-    """Typical distance between neighbouring points on the scanned surfaces, metres.
+    """Estimate the median distance between neighbouring points on the scanned surfaces.
 
-    From the radius of the disc that holds `n_neighbours` points around sampled points:
-    close pairs of overlapping scans do not make it smaller than it is. `among` says around
-    which points, where others lack neighbours.
+    It follows from the radius of the disc that holds `n_neighbours` points around sampled
+    points, so that close pairs of overlapping scans do not make it too small.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Metres.
+    n_sample : int
+        Points around which the spacing is taken.
+    n_neighbours : int
+    among : ndarray of bool, shape (n,), optional
+        Points that may be sampled, where others lack neighbours.
+    progress : Progress
+
+    Returns
+    -------
+    float
+        Metres; 0 for fewer than two points.
     """
     if len(xyz) < 2:
         return 0.0

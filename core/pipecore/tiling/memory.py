@@ -57,10 +57,20 @@ def estimate_need(
     box: Corners | None = None,
     columns: str = "",
 ) -> Need:
-    """Compare what the detection in one piece would take with the memory limit.
+    """Estimate the memory that a detection in one piece takes, beside the limit.
 
-    Of a box it is known how many points it holds at most where a file has an octree. `columns`
-    are those of text files; see `InputSettings.columns`.
+    Parameters
+    ----------
+    paths : sequence of Path
+    settings : TilingSettings
+    box : Box, optional
+        Only the points within are counted, where a file has an octree.
+    columns : str
+        Of text files; see `InputSettings.columns`.
+
+    Returns
+    -------
+    Need
 
     Raises
     ------
