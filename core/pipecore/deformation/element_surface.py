@@ -23,13 +23,18 @@ from pipecore.types import Element
 MIN_POINTS = 30
 """Fewer points near the contour do not define an element's surface."""
 
-INWARD_REACH, OUTWARD_REACH = 0.5, 0.25
-"""Distance from the contour up to which deformations are searched, fractions of the radius."""
+INWARD_REACH, OUTWARD_REACH = 0.95, 0.25
+"""Distance from the contour up to which deformations are searched, fractions of the radius: damage
+is bounded by nothing but the axis."""
 
 MIN_ALIGNMENT = np.cos(np.deg2rad(50.0))
 """The flank of the steepest dent (35°) with a noisy normal (5°, three times)."""
 
-STEEPEST_FLANK = np.tan(np.deg2rad(35.0))
+MIN_INWARD_ALIGNMENT, CLEARLY_INWARD = np.cos(np.deg2rad(75.0)), 0.05
+"""Inside the contour by more than this share of the radius there is nothing but damage, and deep
+damage has steep flanks."""
+
+STEEPEST_FLANK, STEEPEST_INWARD_FLANK = np.tan(np.deg2rad([35.0, 65.0]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +97,9 @@ def find_element_surface(element: Element, points: UnrolledPoints) -> ElementSur
     length = element.axis.length
     near = (points.chainage > -0.05 * radius) & (points.chainage < length + 0.05 * radius)
     near &= np.abs(points.height) < INWARD_REACH * radius
-    facing = near & ~(points.alignment < MIN_ALIGNMENT)
+    inward = points.height < -CLEARLY_INWARD * radius
+    least = np.where(inward, MIN_INWARD_ALIGNMENT, MIN_ALIGNMENT)
+    facing = near & ~(points.alignment < least)
     band = max(4 * min(element.rms, 0.03 * radius), 0.02 * radius)
     core = facing & (np.abs(points.height) < band)
     if np.count_nonzero(core) < MIN_POINTS:
@@ -148,7 +155,7 @@ def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flag
     # Where most points of a cell lie off the contour, the surface has left it.
     n_off = grid.count(cell[facing]) - grid.count(cell[at_contour])
     value[n_off > grid.count(cell[at_contour])] = np.nan
-    step = STEEPEST_FLANK * max(grid.row_size, grid.column_size)
+    size = max(grid.row_size, grid.column_size)
 
     open_points = np.flatnonzero(facing)
     for _ in range(max(grid.shape)):
@@ -162,9 +169,11 @@ def _grow(grid: Grid, level: Array, noise: Array, cell: np.ndarray, facing: Flag
         reachable = ~known & (weight_2 > 0)
         open_points = open_points[~known.ravel()[cell[open_points]]]
         at = cell[open_points]
-        gap = np.abs(level[open_points] - predicted.ravel()[at])
+        gap = level[open_points] - predicted.ravel()[at]
         # The prediction is the mean of cells up to two steps away.
-        fits = reachable.ravel()[at] & (gap < 3 * noise[open_points] + 1.5 * step)
+        rise = 1.5 * size * np.where(gap < 0, STEEPEST_INWARD_FLANK, STEEPEST_FLANK)
+        is_near = np.abs(gap) < 3 * noise[open_points] + rise
+        fits = reachable.ravel()[at] & is_near
         if not fits.any():
             break
         chosen = open_points[fits]

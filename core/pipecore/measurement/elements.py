@@ -20,6 +20,9 @@ from pipecore.types import NO_ID, Deformation, Element, Profiles
 
 Array = NDArray[np.float64]
 
+DEEPEST = 0.05
+"""Damage is looked for down to this distance from the axis, in radii."""
+
 
 @dataclass(frozen=True, eq=False)
 class MeasuredElements:
@@ -159,7 +162,7 @@ def _measure(
     check: Callable[[], None],
 ) -> _MeasuredElement:
     radius = max(element.radius, element.radius_end)
-    downsampled = nearby.around_axis(element.axis, radius, 0.5 * radius)
+    downsampled = nearby.around_axis(element.axis, radius, 0.5 * radius, DEEPEST)
     index, xyz, normals = nearby.full_resolution_with_normals(downsampled)
     finding = find_deformations(element, xyz, normals, neighbours, options.deformations)
     check()

@@ -97,7 +97,8 @@ def cut_normal_stack(
 
     at = np.asarray((rows + 0.5) * width, np.float64)
     up, right = axis.frame(at)
-    nominal = element.radius_at(at)
+    # A sphere has no radius at its poles.
+    nominal = np.maximum(element.radius_at(at), 1e-9)
     table = Profiles(
         element_id=np.full(len(rows), element.element_id, np.int32),
         stack_id=np.full(len(rows), OWN_STACK, np.int32),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipecore import detect
-from pipecore.types import ElementKind, PointCloud
+from pipecore.types import DeformationKind, ElementKind, PointCloud
 from tests.core.shapes import jittered, random_rotation
 
 
@@ -48,3 +48,47 @@ def test_that_a_pipe_of_a_wavy_surface_is_found_whole(rng, radius, arc_deg):
     assert element.kind is ElementKind.CYLINDER
     assert element.radius == pytest.approx(radius, rel=0.01)
     assert element.axis.length == pytest.approx(length, rel=0.05)
+
+
+def dented(rng, shape, radius=0.1, length=3.0, noise=0.002):
+    """A lone pipe, 10 mm spacing, whose radius `shape` of chainage and clock changes."""
+    s, around = jittered(rng, length, 2 * np.pi * radius, 0.01)
+    clock = around / radius
+    rho = radius + shape(s, clock)
+    xyz = np.stack([rho * np.cos(clock), rho * np.sin(clock), s], axis=1)
+    xyz = (xyz + noise * rng.normal(size=xyz.shape)) @ random_rotation(rng).T
+    return PointCloud(xyz=xyz, origin=np.zeros(3))
+
+
+@pytest.mark.parametrize("depth", [0.02, 0.04, 0.06, 0.08])
+def test_that_a_dent_is_measured_however_deep_it_is(rng, depth):
+    """250 mm × 160 mm, down to 80 % of the radius: nothing but the axis bounds damage."""
+
+    def dent(s, clock):
+        along, across = (s - 1.5) / 0.25, 0.1 * (clock - np.pi) / 0.16
+        inside = (np.abs(along) < 0.5) & (np.abs(across) < 0.5)
+        return -depth * inside * (np.cos(np.pi * along) * np.cos(np.pi * across)) ** 2
+
+    result = detect(dented(rng, dent))
+    (element,), (found,) = result.elements, result.deformations
+    assert element.radius == pytest.approx(0.1, rel=0.005)
+    assert found.kind is DeformationKind.DENT
+    assert found.depth == pytest.approx(depth, rel=0.1)
+    assert abs(found.chainage - 1.5) < 0.1
+
+
+@pytest.mark.parametrize("ovality", [0.06, 0.10])
+def test_that_a_flattened_stretch_is_told_as_one_thing(rng, ovality):
+    """0.6 m of a pipe of 3 m, with smooth ends: the pipe stays whole, and nothing else is told."""
+
+    def flattened(s, clock):
+        share = np.clip((0.4 - np.abs(s - 1.5)) / 0.1, 0.0, 1.0)
+        return 0.1 * ovality / 2 * share * np.cos(2 * clock)
+
+    result = detect(dented(rng, flattened))
+    (element,), (found,) = result.elements, result.deformations
+    assert element.axis.length == pytest.approx(3.0, abs=0.05)
+    assert found.kind is DeformationKind.OVALITY
+    assert found.ovality == pytest.approx(ovality, rel=0.1)
+    assert found.chainage_start < 1.35
+    assert found.chainage_end > 1.65

@@ -141,10 +141,13 @@ class NearbyPoints:
             cell_starts, middles, 0.5 * np.sqrt(3.0) * edge + 1e-6, points, starts,
         )  # fmt: skip
 
-    def around_axis(self, axis: Axis, radius: float, margin: float) -> Indices:
-        """Downsampled points within the neighbourhood of `axis`, up to `margin` beyond its ends."""
-        inner, outer = INNER * radius, OUTER * radius
-        tube = cell_search.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
+    def around_axis(
+        self, axis: Axis, radius: float, margin: float, inner: float = INNER
+    ) -> Indices:
+        """Downsampled points from `inner` radii off `axis` on, up to `margin` beyond its ends."""
+        tube = cell_search.Tube(
+            axis.numbers, inner * radius, OUTER * radius, -margin, axis.length + margin
+        )
         cells = cell_search.cells_around(self._grid, tube)
         return np.asarray(point_search.points_around(self.surface.xyz, self._grid, cells, tube))
 
