@@ -54,8 +54,8 @@ def axis(rng):
 def test_that_a_proposal_that_is_slightly_off_becomes_the_pipe(rng, axis):
     nearby = nearby_of(scanned(rng, axis))
     up, right = axis.frame(0.0)
-    off = LineAxis(axis.start + 0.004 * up - 0.003 * right, axis.direction, 1.0)
-    (pipe,) = selected([proposed(off, 1.03 * RADIUS)], nearby)
+    off = LineAxis(axis.start + 0.001 * up - 0.001 * right, axis.direction, 1.0)
+    (pipe,) = selected([proposed(off, 1.01 * RADIUS, length=0.8)], nearby)
     assert pipe.fit.model.radius == pytest.approx(RADIUS, abs=0.0005)
     assert np.degrees(angle_between(pipe.axis.direction, axis.direction)) < 0.1
     assert pipe.axis.length == pytest.approx(1.0, abs=0.03)

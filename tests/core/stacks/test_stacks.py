@@ -25,8 +25,8 @@ from tests.core.shapes import (
 NONE_CURVED = StackSettings(DirectionPreset.AUTOMATIC)
 
 
-def floor(rng):
-    return plane(rng, np.zeros(3), [1, 0, 0], [0, 1, 0], 0.02, 0.002)
+def floor(rng, corner=(0.0, 0.0, 0.0)):
+    return plane(rng, corner, [1, 0, 0], [0, 1, 0], 0.02, 0.002)
 
 
 def test_that_a_profile_holds_what_lies_within_its_width(rng):
@@ -97,18 +97,19 @@ def test_that_thinly_scanned_places_are_cut_again_by_wider_profiles(rng):
 
 
 def test_that_automatic_directions_are_the_axes_of_the_pipes(rng):
-    # Three pipes well apart in attitude, in a random frame.
+    # Three pipes well apart in attitude, in a random frame, and a floor that meets none of them.
     true = random_rotation(rng)
     pipes = [
         tube(rng, LineAxis(np.array([2.0 * i, 0, 0]), d, 1.0), 0.1, noise=0.002)
         for i, d in enumerate(true)
     ]
-    surface = sampled(*pipes, floor(rng))
+    surface = sampled(*pipes, floor(rng, (-3.0, 0.0, 0.0)))
     stacks = choose_stacks(surface, StackSettings(), 5.0, NoProgress())
     found = np.array([s.direction for s in stacks if not s.min_spacing])
     for d in true:
+        # 1.1° at most in 200 draws.
         assert np.degrees(angle_between(found, d).min()) < 3.0
-    assert len(found) <= 6
+    assert len(found) == 3
 
 
 def test_that_every_oblique_pipe_is_cut_well_by_an_automatic_stack(rng):
@@ -120,7 +121,8 @@ def test_that_every_oblique_pipe_is_cut_well_by_an_automatic_stack(rng):
     stacks = choose_stacks(sampled(*pipes), StackSettings(), 5.0, NoProgress())
     found = np.array([s.direction for s in stacks])
     for d in true:
-        assert np.degrees(angle_between(found, d).min()) < 40.0  # the gate of flattening is 45°
+        # A place further than 24° from a direction gets one of its own; 23.9° at most in 900 draws.
+        assert np.degrees(angle_between(found, d).min()) < 27.0
 
 
 def test_that_the_directions_of_a_bend_are_all_covered(rng):
@@ -131,7 +133,8 @@ def test_that_the_directions_of_a_bend_are_all_covered(rng):
         [s.direction for s in choose_stacks(surface, StackSettings(), 5.0, NoProgress())]
     )
     for tangent in bend.tangent(np.linspace(0.1, 0.9, 9) * bend.length):
-        assert np.degrees(angle_between(found, tangent).min()) < 45.0  # the gate of flattening
+        # Directions 30° apart and the bend's ends: 16.5° at most in 900 draws, with an SD of 0.5°.
+        assert np.degrees(angle_between(found, tangent).min()) < 20.0
 
 
 def test_that_a_scene_without_curved_surfaces_gets_the_axes_and_diagonals(rng):
