@@ -12,7 +12,7 @@ from pipecore.errors import CancelledError
 from pipecore.progress import Progress
 
 HEARTBEAT = 0.15
-"""Progress is told at least this often, seconds, so that a cancel is soon heard."""
+"""Progress is reported at least this often, seconds, so that a cancel takes effect soon."""
 
 _n_threads = os.cpu_count() or 1
 

@@ -184,7 +184,7 @@ class Labels(tuple[Element, ...]):
 
 
 def noted(result: Result, what: str) -> Result:
-    """Take note of a change; relate the deformations to what is around them now."""
+    """Record a change and relate the deformations to what is around them now."""
     alone = [replace(d, **NOT_RELATED) for d in result.deformations]
     runs = {e.run_id for e in result.elements}
     return replace(
@@ -196,13 +196,13 @@ def noted(result: Result, what: str) -> Result:
 
 
 def with_element(result: Result, element: Element) -> Result:
-    """Put an element in the place of the one with its id."""
+    """Replace the element that has the same id."""
     elements = (element if e.element_id == element.element_id else e for e in result.elements)
     return replace(result, elements=tuple(elements))
 
 
 def with_settings(result: Result, element_ids: Collection[int], settings: Settings) -> Result:
-    """Take note of the settings with which some elements were found or measured."""
+    """Record the settings with which some elements were found or measured."""
     own = {i: other for i, other in result.own_settings.items() if i not in element_ids}
     if settings != result.settings:
         own |= dict.fromkeys(sorted(element_ids), settings)

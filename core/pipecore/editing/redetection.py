@@ -15,11 +15,11 @@ from pipecore.settings import Settings
 from pipecore.types import NO_ID, Element, PointCloud, Profiles, Result, Stack
 
 Indices = NDArray[np.intp]
-WITHIN = 0.9
-"""An element is of the part if this share of its points is."""
-TAKEN = 0.5
-"""What is found again of elements that stay has more than this share of its points from them."""
-SAME = 0.3
+MIN_SHARE_WITHIN = 0.9
+"""An element is replaced if at least this share of its points lies in the part."""
+MAX_SHARE_OF_KEPT = 0.5
+"""A found element is dropped if more of its points than this share belong to elements that stay."""
+MIN_SHARE_OF_FORMER = 0.3
 """A found element is a former one if it has at least this share of its points from it."""
 
 
@@ -69,7 +69,7 @@ def detect_again(
     progress: Progress = NoProgress(),
     replaced: Collection[int] | None = None,
 ) -> Result:
-    """Detect in a part of the cloud and put what is found in the place of what was there.
+    """Detect in a part of the cloud and replace the elements that were there.
 
     Elements that lie in the part are replaced, or those that are named; one that only
     reaches into the part stays, and is not found a second time. What is found again keeps
@@ -108,14 +108,18 @@ def detect_again(
     gone = {
         e.element_id
         for e in result.elements
-        if replaced is None and n_within[e.element_id] >= WITHIN * n_all[e.element_id]
+        if replaced is None and n_within[e.element_id] >= MIN_SHARE_WITHIN * n_all[e.element_id]
     }
     gone |= {find(result, i).element_id for i in replaced or ()}
     rest = without(result, gone)
     is_kept = rest.element_id[index] != NO_ID
     n_found = np.bincount(found.element_id, minlength=len(found.elements) + 1)
     n_kept = np.bincount(found.element_id, is_kept, minlength=len(found.elements) + 1)
-    taken = [e for e in found.elements if n_kept[e.element_id] <= TAKEN * n_found[e.element_id]]
+    taken = [
+        e
+        for e in found.elements
+        if n_kept[e.element_id] <= MAX_SHARE_OF_KEPT * n_found[e.element_id]
+    ]
     new_id = _ids(taken, found, before, gone, n_ids)
     stacks, stack_ids = _joined_stacks(result.stacks, found.stacks)
     elements = _numbered(taken, new_id, result)
@@ -140,7 +144,7 @@ def _ids(
         counts = np.bincount(owners)
         claims += [
             (-int(counts[i]), element.element_id, int(i))
-            for i in np.flatnonzero(counts >= SAME * len(owners))
+            for i in np.flatnonzero(counts >= MIN_SHARE_OF_FORMER * len(owners))
             if int(i) in gone
         ]
     given: dict[int, int] = {}

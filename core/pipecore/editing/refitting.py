@@ -39,7 +39,7 @@ MARGIN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class RefittedElement:
-    """An element after its fit; as it was where the points do not carry one."""
+    """An element after its fit; as it was where the points determine none."""
 
     element: Element
     is_fitted: bool
@@ -58,7 +58,7 @@ def fit_shape(
         Points of its surface, and perhaps some beyond its ends.
     thinning : ThinningSettings
     progress : Progress
-        Told of the stage "fitting".
+        Receives the stage "fitting".
 
     Raises
     ------

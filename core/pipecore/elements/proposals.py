@@ -1,9 +1,9 @@
-"""Pieces of axes: which ellipses make a cylinder, a bend, a reducer or a sphere.
+"""Proposals: surfaces that explain the ellipses of a chain: cylinder, reducer, bend or sphere.
 
 The paper classifies by the shape of the axis (line or arc) and by the pattern of the
 radius along it (constant, linear, semicircle; figure 7). Here each pattern is a model,
-and in every chain of centres the models that explain most ellipses are taken off one
-after the other.
+and in every chain of centres the model that explains most ellipses is removed first, then
+the next.
 """
 
 from dataclasses import dataclass
@@ -30,18 +30,18 @@ MAX_OFFSET = 0.06
 MAX_CHANGE = 0.06
 """A radius is off the pattern by less than this share."""
 SAME_RADIUS = 0.025
-"""Radii of one piece differ from its pattern by less than this share (and twice their sd)."""
+"""Radii of one proposal differ from its pattern by less than this share (and twice their SD)."""
 MIN_ELLIPSES = 5
-MOSTLY_STRAIGHT = 0.7
+MAX_STRAIGHT_SHARE = 0.7
 """What is a bend only at its ends is a straight, such as a vessel between its heads."""
-MIN_SPHERE = 8
+MIN_SPHERE_ELLIPSES = 8
 """Ellipses cut off its centre that make a sphere."""
-SAME_CENTRE = 0.06
+MAX_CENTRE_OFFSET = 0.06
 """Normals of a sphere's sections meet within this share of its radius."""
 MIN_TAPER = 0.04
-LONG_PIECE = 2.5
-"""Straight pieces of this many radii come first: shorter ones may be part of a bend."""
-SHORT_PIECE = 0.5
+LONG_STRAIGHT_RADII = 2.5
+"""Straights of this many radii are taken first: shorter ones may be part of a bend."""
+SHORT_STRAIGHT_RADII = 0.5
 CHAINS_AT_ONCE = 64
 
 
@@ -72,7 +72,7 @@ class Proposal:
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """What of the ellipses makes pieces, one array per column."""
+    """Columns of the ellipses from which proposals are made."""
 
     centre: Array
     axis: Array
@@ -125,23 +125,23 @@ def propose_surfaces(
             found[i] = _explain_chain(ellipses, rows, chains[i])
 
     for_chunks(explain, len(chains), CHAINS_AT_ONCE, "elements", progress, (0.0, 0.3))
-    return [*find_spheres(ellipses), *(piece for pieces in found for piece in pieces)]
+    return [*find_spheres(ellipses), *(proposal for proposals in found for proposal in proposals)]
 
 
 def _explain_chain(ellipses: Ellipses, rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
-    pieces, members = _take_lines(rows, members, LONG_PIECE)
-    tapered, members = _take_lines(rows, members, SHORT_PIECE, is_tapered=True)
-    pieces += tapered
+    proposals, members = _take_lines(rows, members, LONG_STRAIGHT_RADII)
+    tapered, members = _take_lines(rows, members, SHORT_STRAIGHT_RADII, is_tapered=True)
+    proposals += tapered
     for group in _reconnected(ellipses, members):
         arcs = _take_arcs(rows, group)
-        pieces += arcs
-        for piece in arcs:
-            members = np.setdiff1d(members, piece.ellipses)
-    return pieces + _take_lines(rows, members, SHORT_PIECE)[0]
+        proposals += arcs
+        for proposal in arcs:
+            members = np.setdiff1d(members, proposal.ellipses)
+    return proposals + _take_lines(rows, members, SHORT_STRAIGHT_RADII)[0]
 
 
 def _reconnected(ellipses: Ellipses, members: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Groups of the members that still hang together."""
+    """Groups of members whose centres are still chained."""
     if len(members) < MIN_ELLIPSES:
         return []
     label = join_centres(ellipses[members], NoProgress())
@@ -154,9 +154,9 @@ def _take_lines(
     min_length: float,
     is_tapered: bool = False,
 ) -> tuple[list[Proposal], NDArray[np.intp]]:
-    """Take straight pieces of at least `min_length` radii off the members, best first.
+    """Take straights of at least `min_length` radii from the members, best first.
 
-    Returns them and the members that are left.
+    Returns the straights and the members that are left.
     """
     if len(members) < MIN_ELLIPSES:
         return [], members
@@ -166,7 +166,7 @@ def _take_lines(
         MIN_COS, MAX_OFFSET, MAX_CHANGE, SAME_RADIUS, MIN_TAPER, min_length, MIN_ELLIPSES
     )
     lines = take_lines(e.on_axis, N_TRIALS, is_tapered, limits, float(np.median(e.width)), number)
-    pieces = [
+    proposals = [
         Proposal(
             LineSurface(line[:3].copy(), line[3:6].copy(), line[6], line[7], is_tapered),
             members[number == k],
@@ -175,16 +175,16 @@ def _take_lines(
         )
         for k, line in enumerate(lines)
     ]
-    return pieces, members[number < 0]
+    return proposals, members[number < 0]
 
 
 def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
-    """Take bends off the members, best first."""
+    """Take bends from the members, best first."""
     e = rows[members]
     free = np.ones(len(members), np.bool_)
     inliers = np.empty(len(members), np.bool_)
     arc = np.empty(8)
-    pieces: list[Proposal] = []
+    proposals: list[Proposal] = []
     while free.sum() >= MIN_ELLIPSES:
         limits = PieceLimits(MIN_COS, 1.5 * MAX_OFFSET, 1.5 * MAX_CHANGE)
         count = best_arc(e.on_axis, free, N_TRIALS, limits, inliers, arc)
@@ -195,7 +195,7 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
         straight = np.empty(len(members), np.bool_)
         limits = PieceLimits(MIN_COS, MAX_OFFSET, MAX_CHANGE)
         n_straight = best_line(e.on_axis, inliers, N_TRIALS, False, limits, straight)
-        if n_straight > MOSTLY_STRAIGHT * count:
+        if n_straight > MAX_STRAIGHT_SHARE * count:
             continue
         model = ArcSurface(
             arc[:3].copy(), arc[3:6].copy(), arc[6], float(np.median(e.radius[chosen]))
@@ -203,8 +203,8 @@ def _take_arcs(rows: _Rows, members: NDArray[np.intp]) -> list[Proposal]:
         low, high, part = arc_extent(model, e.centre[chosen])
         if len(part) < MIN_ELLIPSES or high - low < np.deg2rad(12.0):
             continue
-        pieces.append(Proposal(model, members[chosen[part]], low, high))
-    return pieces
+        proposals.append(Proposal(model, members[chosen[part]], low, high))
+    return proposals
 
 
 def arc_angles(model: ArcSurface, points: Array) -> Array:
@@ -248,19 +248,23 @@ def find_spheres(ellipses: Ellipses) -> list[Proposal]:
     offset = np.einsum("ij,ij->i", ellipses.centre - centres, ellipses.normal) / radii
     free = np.isfinite(radii)
     tree = cKDTree(np.where(free[:, None], centres, 1e9))
-    pieces: list[Proposal] = []
+    proposals: list[Proposal] = []
     may_be = np.flatnonzero(free & (np.abs(offset) > 0.15))
     # Most have hardly a neighbour: counting them all at once is quick.
-    n_near = tree.query_ball_point(centres[may_be], SAME_CENTRE * radii[may_be], return_length=True)
-    for i in may_be[n_near >= MIN_SPHERE]:
+    n_near = tree.query_ball_point(
+        centres[may_be], MAX_CENTRE_OFFSET * radii[may_be], return_length=True
+    )
+    for i in may_be[n_near >= MIN_SPHERE_ELLIPSES]:
         if not free[i]:
             continue
-        near = np.sort(np.array(tree.query_ball_point(centres[i], SAME_CENTRE * radii[i]), np.intp))
+        near = np.sort(
+            np.array(tree.query_ball_point(centres[i], MAX_CENTRE_OFFSET * radii[i]), np.intp)
+        )
         near = near[free[near] & (np.abs(radii[near] - radii[i]) < 0.05 * radii[i])]
         is_far = np.abs(offset[near]) > 0.1
-        if is_far.sum() < MIN_SPHERE or np.ptp(offset[near]) < 0.4:
+        if is_far.sum() < MIN_SPHERE_ELLIPSES or np.ptp(offset[near]) < 0.4:
             continue
         model = SphereSurface(np.median(centres[near], axis=0), float(np.median(radii[near])))
         free[near] = False
-        pieces.append(Proposal(model, near))
-    return pieces
+        proposals.append(Proposal(model, near))
+    return proposals

@@ -10,7 +10,7 @@ from pipecore.elements.fittings.reducers import find_steps, fit_reducer
 from pipecore.elements.fittings.straight_ends import straight_ends
 from pipecore.elements.gates.acceptance import passes_gates
 from pipecore.elements.gates.rounded_corners import is_rounded_corner
-from pipecore.elements.proposals import LONG_PIECE, Proposal
+from pipecore.elements.proposals import LONG_STRAIGHT_RADII, Proposal
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import refine_proposal
@@ -82,7 +82,9 @@ def _by_support(proposals: list[Proposal]) -> tuple[list[Proposal], list[Proposa
         match proposal.model:
             case SphereSurface():
                 groups[0].append(proposal)
-            case LineSurface(is_tapered=False, radius=r) if proposal.length > LONG_PIECE * r:
+            case LineSurface(is_tapered=False, radius=r) if (
+                proposal.length > LONG_STRAIGHT_RADII * r
+            ):
                 groups[1].append(proposal)
             case _:
                 groups[2].append(proposal)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipecore._kernels.grouping import group_from
-from pipecore._kernels.section_circles import fit_sections
+from pipecore._kernels.section_circles import empty_circles, fit_sections
 from pipecore.ellipses import (
     CIRCLE_PARAMETERS,
     ELLIPSE_PARAMETERS,
@@ -80,13 +80,13 @@ def cut_normal_stack(
     up_right = np.stack([rho * np.cos(clock), rho * np.sin(clock)], axis=1)
     if len(rows) == 0:
         return Profiles.empty()
-    fits = np.empty((len(rows), 5))
+    circles = empty_circles(len(rows))
     fit_sections(
         np.ascontiguousarray(up_right[:, 0]), np.ascontiguousarray(up_right[:, 1]),
-        starts, 4.0 * spacing, fits,
+        starts, 4.0 * spacing, circles,
     )  # fmt: skip
     n_points = np.diff(starts)
-    radius, rms, arc = fits[:, 2], fits[:, 3], fits[:, 4]
+    radius, rms, arc = circles.radius, circles.rms, circles.arc
     is_long = (arc >= FREE_FIT_ARC) & (n_points >= 12)
     free = fit_free_ellipses(up_right, starts, is_long, fit, check)
     is_free = is_long & np.isfinite(free.semi_minor)
@@ -104,7 +104,7 @@ def cut_normal_stack(
         stack_id=np.full(len(rows), OWN_STACK, np.int32),
         profile_index=rows.astype(np.int32),
         chainage=at,
-        centre=axis.at(at) + fits[:, :1] * up + fits[:, 1:2] * right,
+        centre=axis.at(at) + circles.centre_x[:, None] * up + circles.centre_y[:, None] * right,
         normal=np.array(axis.tangent(at)),
         major_direction=np.cos(angle)[:, None] * up + np.sin(angle)[:, None] * right,
         semi_minor=semi_minor,
@@ -113,7 +113,7 @@ def cut_normal_stack(
         radius=radius,
         radius_sd=rms * radius_sd_factor(arc) / np.sqrt(n_points),
         ovality=np.where(is_free, (semi_major - semi_minor) / nominal, np.nan),
-        centre_deviation=np.hypot(fits[:, 0], fits[:, 1]),
+        centre_deviation=np.hypot(circles.centre_x, circles.centre_y),
         radius_deviation=radius - nominal,
         arc=arc,
         n_points=n_points.astype(np.int32),

@@ -16,11 +16,11 @@ from pipecore.types import Stack
 
 __all__ = ["choose_stacks", "preset_directions"]
 
-WIDTH = 2.0
+WIDTH_VOXELS = 2.0
 """Automatic profile width, in voxels."""
-WIDER = 2.5
+WIDE_WIDTH_RATIO = 2.5
 """Width of the wide profiles, in those of the narrow ones."""
-SPARSE = 1.25
+SPARSE_VOXELS = 1.25
 """Places with at least this spacing, in voxels, are cut by wide profiles too."""
 
 
@@ -72,7 +72,7 @@ def choose_stacks(
     SettingsError
         If they ask for none.
     """
-    width = settings.width_mm / 1e3 or WIDTH * surface.voxel
+    width = settings.width_mm / 1e3 or WIDTH_VOXELS * surface.voxel
     named: list[tuple[str, ArrayLike, float]] = []
     if settings.preset is DirectionPreset.AUTOMATIC:
         found = automatic_directions(find_round_places(surface, max_radius, progress))
@@ -98,15 +98,15 @@ def _wide_stacks(stacks: list[Stack], surface: Surface) -> list[Stack]:
 
     Stacks whose width the user gave stay as they are.
     """
-    min_spacing = SPARSE * surface.voxel
-    automatic = [s for s in stacks if s.width == WIDTH * surface.voxel]
+    min_spacing = SPARSE_VOXELS * surface.voxel
+    automatic = [s for s in stacks if s.width == WIDTH_VOXELS * surface.voxel]
     if not (surface.spacing >= min_spacing).any():
         return []
     return [
         replace(
             stack,
             stack_id=len(stacks) + i,
-            width=WIDER * stack.width,
+            width=WIDE_WIDTH_RATIO * stack.width,
             name=f"{stack.name}, wide",
             min_spacing=min_spacing,
         )

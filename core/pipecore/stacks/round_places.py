@@ -18,7 +18,7 @@ from pipecore.surface.grid import GridFrame, VoxelCounter, bounds, table_of
 
 Array = NDArray[np.float64]
 
-FINEST, COARSER = 4.0, 3
+FINEST_VOXELS, SCALE_RATIO = 4.0, 3
 """Edge of the smallest cells, in voxels, and how many times wider those of the next scale are.
 A neighbourhood of three cells across turns a normal enough to tell from radii of a third of
 the edge up to five of it."""
@@ -75,7 +75,7 @@ def find_round_places(
         return RoundPlaces(np.empty((0, 3)), np.empty(0))
     low, high = bounds(surface.xyz)
     widest = min(float((high - low).max()), max_radius)
-    edge = FINEST * surface.voxel
+    edge = FINEST_VOXELS * surface.voxel
     cells, sums = _sum_finest(surface, edge, low, progress)
     axes, counts = [], []
     while len(cells):
@@ -85,7 +85,7 @@ def find_round_places(
             is_round = (miss < MAX_MISS * distance) & (distance < max_radius) & (sums[:, 0] > 0)
         axes.append(found[is_round, :3])
         counts.append(sums[is_round, 0])
-        edge *= COARSER
+        edge *= SCALE_RATIO
         if edge > widest:
             break
         cells, sums = _coarser(cells, sums)
@@ -123,7 +123,7 @@ def _sum_finest(
 
 def _coarser(cells: NDArray[np.int64], sums: Array) -> tuple[NDArray[np.int64], Array]:
     """Cells of the next scale, with the sums of the finer ones in them."""
-    merged, place = np.unique(cells // COARSER, axis=0, return_inverse=True)
+    merged, place = np.unique(cells // SCALE_RATIO, axis=0, return_inverse=True)
     total = np.zeros((len(merged), sums.shape[1]))
     np.add.at(total, place.ravel(), sums)
     return merged, total

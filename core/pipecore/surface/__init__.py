@@ -53,7 +53,7 @@ NO_FULL_RESOLUTION_POINTS: Order = np.empty(0, np.int32), np.zeros(1, np.int32)
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Downsampled points with what their neighbourhoods tell.
+    """Downsampled points with normals, spacing and noise from their neighbourhoods.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Surface:
         return max(0.25 * self.voxel, 3.0 * self.noise, 0.002)
 
     def part(self, rows: NDArray[np.integer]) -> "Surface":
-        """Some of the points, without those of the cloud behind them."""
+        """Some of the points, without the cloud's points that they are means of."""
         return Surface(
             self.xyz[rows],
             self.normals[rows],

@@ -1,6 +1,6 @@
 """Floors, walls and other planes: no profile of theirs holds an ellipse, so none is cut.
 
-A place is told from the normals in cubic cells. Flat cells that go on in each other make
+They are recognised by the normals in cubic cells. Flat cells that continue each other make
 patches, and a patch is plane if the widest pipe there may be would bend away from its plane by
 far more than the patch does. Narrow flat patches may be a strip of such a pipe and are no planes.
 """
@@ -16,10 +16,10 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface.grid import GridFrame, VoxelCounter
 
-CELL = 8.0
+CELL_VOXELS = 8.0
 """Edge of the cells, in voxels."""
 MIN_POINTS = 20
-"""Of a cell and those around it, to tell whether they are flat."""
+"""Of a cell and those around it, to decide whether they are flat."""
 MAX_SPREAD, MAX_CURVED = 0.03, 0.01
 """Largest second eigenvalue of Σnnᵀ of flat places, and its largest difference from the least."""
 MAX_TURN_COS = np.cos(np.deg2rad(10.0))
@@ -31,10 +31,10 @@ need not be plane. Cubes begin at two places, so that no strip is left over at t
 SAGITTA = np.sqrt(0.2)
 """A strip of a cylinder lies off its plane by this times the mean square of its width over its
 radius: root mean squares of x² / 2r and x for x spread evenly."""
-SHARE_OF_SAGITTA = 0.3
+MAX_SAGITTA_SHARE = 0.3
 """A plane lies off itself by at most this share of what the widest pipe would."""
 
-AT_A_TIME = 1_000_000
+POINTS_AT_A_TIME = 1_000_000
 
 NO_PLANE = -1
 
@@ -74,7 +74,7 @@ def sum_cells(
     xyz: NDArray[np.float64], normals: NDArray[np.float64], voxel: float
 ) -> tuple[CellSums, NDArray[np.int32]]:
     """Sum up points by cell; also the cell of each point."""
-    edge = CELL * voxel
+    edge = CELL_VOXELS * voxel
     ids = np.empty(len(xyz), np.int32)
     if len(xyz) == 0:
         return CellSums(np.empty((0, 3), np.int64), np.empty((0, kernels.N_SUMS), np.int64)), ids
@@ -105,7 +105,7 @@ def find_planes(parts: Sequence[CellSums], voxel: float, max_radius: float) -> l
     if sum(n_cells) == 0:
         return [CellPlanes(np.empty(0, np.int32), np.empty(0, np.bool_)) for _ in parts]
     cells = np.concatenate([part.cells for part in parts])
-    edge = CELL * voxel
+    edge = CELL_VOXELS * voxel
     frame = GridFrame.around(cells.min(axis=0) + 0.5, cells.max(axis=0) + 0.5, 1.0)
     keys, at, place = np.unique(frame.keys_of_cells(cells), return_index=True, return_inverse=True)
     cells = cells[at]
@@ -140,7 +140,7 @@ def _planes_of_cells(
         return roots
 
     block = max(SMALLEST_BLOCK, int(BLOCK * max_radius))
-    max_ratio = SHARE_OF_SAGITTA * SAGITTA / max_radius
+    max_ratio = MAX_SAGITTA_SHARE * SAGITTA / max_radius
     for begin in (0, block // 2):
         kernels.mark_planes(means, is_flat, patches(block, begin, is_flat), max_ratio, is_plane)
     kernels.mark_inner(keys, *grid, is_plane, sums[:, 0].copy(), is_inner)
@@ -176,8 +176,8 @@ def planes_of_points(
     """
     n = len(xyz)
     plane, is_cut = np.empty(n, np.int32), np.empty(n, np.bool_)
-    n_parts = -(-n // AT_A_TIME)
-    rows = [slice(k * AT_A_TIME, min((k + 1) * AT_A_TIME, n)) for k in range(n_parts)]
+    n_parts = -(-n // POINTS_AT_A_TIME)
+    rows = [slice(k * POINTS_AT_A_TIME, min((k + 1) * POINTS_AT_A_TIME, n)) for k in range(n_parts)]
     parts: list[CellSums | None] = [None] * n_parts
 
     def add(first: int, last: int) -> None:

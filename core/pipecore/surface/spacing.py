@@ -50,11 +50,6 @@ def median_spacing(
     sample = np.asarray(places[sample_by_place(places, n_sample, progress)], np.float64)
     n_neighbours = min(n_neighbours, len(xyz) - 1)
     reach = _reach_of_neighbours(xyz, sample, n_neighbours + 1, progress)
-    return spacing_from_reach(reach, n_neighbours)
-
-
-def spacing_from_reach(reach: NDArray[np.float64], n_neighbours: int) -> float:
-    """Spacing of points from the distances to their nth neighbour."""
     return float(np.median(reach) * np.sqrt(np.pi / (n_neighbours + 1)))
 
 

@@ -39,7 +39,7 @@ def detect_in_tiles(
     settings : Settings
         `settings.tiling` says how much memory may be used and where tiles are processed.
     progress : Progress
-        Told the stages of `pipecore.pipeline.STAGES`, and "reading".
+        Receives the stages of `pipecore.pipeline.STAGES`, and "reading".
     folder : Path, optional
         For temporary files, unless the settings name one; else that of the system.
     box : (2, 3) numbers, optional

@@ -22,7 +22,7 @@ BASE_BYTES = 400 * 2**20
 KEPT_BYTES = 16
 """What a point costs whatever the tiles: tables of cells, flags, lists of elements' points."""
 TEXT_BYTES = 25
-"""A point takes at least about this much in a file that does not tell how many it holds."""
+"""A point takes at least about this much in a file that does not say how many it holds."""
 SHARE_OF_FREE = 2 / 3
 SMALLEST_TILE = 32 * 2**20
 """Tiles of less memory than this cost more than they save."""

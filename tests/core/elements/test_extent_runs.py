@@ -16,11 +16,11 @@ RADIUS, NOISE, VOXEL = 0.1, 0.001, 0.01
 
 
 def wall_points(rng, low, high, arc=np.pi, spacing=VOXEL):
-    """Chainage, clock, residual and lean of points of a pipe between two chainages."""
+    """Chainage, clock, residual and normal_angle of points of a pipe between two chainages."""
     n = round((high - low) * arc * RADIUS / spacing**2)
     clock = rng.uniform(0, arc, n)
-    lean = np.radians(5.0) * rng.normal(size=n)
-    return rng.uniform(low, high, n), clock, NOISE * rng.normal(size=n), lean
+    normal_angle = np.radians(5.0) * rng.normal(size=n)
+    return rng.uniform(low, high, n), clock, NOISE * rng.normal(size=n), normal_angle
 
 
 def floor_points(rng, low, high):
@@ -29,21 +29,23 @@ def floor_points(rng, low, high):
     n = round((high - low) * 2 * aside / VOXEL**2)
     clock = np.pi + np.arctan(rng.uniform(-aside, aside, n) / RADIUS)
     residual = RADIUS / -np.cos(clock) - RADIUS + NOISE * rng.normal(size=n)
-    lean = np.pi - clock + np.radians(5.0) * rng.normal(size=n)
-    return rng.uniform(low, high, n), clock, residual, lean
+    normal_angle = np.pi - clock + np.radians(5.0) * rng.normal(size=n)
+    return rng.uniform(low, high, n), clock, residual, normal_angle
 
 
 NOTHING = np.empty(0), np.empty(0)
 
 
 def extent_of(*parts, length=1.0, inside=NOTHING):
-    chainage, clock, residual, lean = (np.concatenate(p) for p in zip(*parts, strict=True))
+    chainage, clock, residual, normal_angle = (np.concatenate(p) for p in zip(*parts, strict=True))
 
-    def look_inside(begin, end):
+    def find_inside(begin, end):
         within = (inside[0] > begin) & (inside[0] < end)
         return np.stack(inside)[:, within]
 
-    return find_extent(chainage, clock, residual, lean, look_inside, length, RADIUS, VOXEL, NOISE)
+    return find_extent(
+        chainage, clock, residual, normal_angle, find_inside, length, RADIUS, VOXEL, NOISE
+    )
 
 
 def test_that_the_extent_grows_to_where_the_points_end(rng):
@@ -64,8 +66,8 @@ def test_that_a_gap_is_reported_with_its_place(rng):
 
 def bent_points(rng, low, high, arc, waves, amplitude=0.0045):
     """Points of a wall that leaves the circle by so many waves around it."""
-    chainage, clock, residual, lean = wall_points(rng, low, high, arc)
-    return chainage, clock, residual + amplitude * np.cos(waves * clock), lean
+    chainage, clock, residual, normal_angle = wall_points(rng, low, high, arc)
+    return chainage, clock, residual + amplitude * np.cos(waves * clock), normal_angle
 
 
 def test_that_an_oval_stretch_is_still_the_pipe_where_the_arc_can_tell(rng):
@@ -94,10 +96,10 @@ def test_that_points_beyond_a_long_gap_are_of_something_else(rng):
 
 
 def test_that_the_pipe_ends_where_the_points_leave_its_surface(rng):
-    chainage, clock, residual, lean = wall_points(rng, 0.0, 1.6)
+    chainage, clock, residual, normal_angle = wall_points(rng, 0.0, 1.6)
     beyond = chainage > 1.2
     residual[beyond] += 0.05 * (chainage[beyond] - 1.2)
-    extent = extent_of((chainage, clock, residual, lean))
+    extent = extent_of((chainage, clock, residual, normal_angle))
     assert extent.high == pytest.approx(1.23, abs=0.06)
 
 
@@ -115,18 +117,18 @@ def test_that_two_flanges_are_not_one_pipe_with_a_gap_but_a_dented_pipe_is_one(r
 def test_that_a_pipe_ends_where_only_the_floor_goes_on(rng):
     # The floor touches the pipe's surface from below all along: near, but flat.
     pipe, floor = wall_points(rng, 0.0, 1.0, arc=np.radians(240)), floor_points(rng, -1.0, 2.0)
-    chainage, clock, residual, lean = floor
+    chainage, clock, residual, normal_angle = floor
     near = np.abs(residual) < 0.012
-    extent = extent_of(pipe, (chainage[near], clock[near], residual[near], lean[near]))
+    extent = extent_of(pipe, (chainage[near], clock[near], residual[near], normal_angle[near]))
     assert (extent.low, extent.high) == pytest.approx((0.0, 1.0), abs=0.04)
 
 
 def test_that_normals_turn_with_the_clock_on_a_pipe_and_not_on_a_floor(rng):
     for points, turning in ((wall_points(rng, 0, 1), 1.0), (floor_points(rng, 0, 1), 0.0)):
-        _, clock, _, lean = points
+        _, clock, _, normal_angle = points
         row = rng.integers(0, 2, len(clock))
         found = np.empty(3)
-        normal_turning(clock, lean, row, found)
+        normal_turning(clock, normal_angle, row, found)
         assert_allclose(found, [turning, turning, 0.0], atol=0.1)
 
 

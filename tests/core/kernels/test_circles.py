@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
 
 from pipecore._kernels.circles import geometric_circle, taubin_circle, tukey_weight
-from pipecore._kernels.section_circles import fit_sections
+from pipecore._kernels.section_circles import empty_circles, fit_sections
 
 pytestmark = pytest.mark.kernels
 
@@ -101,14 +101,15 @@ def test_that_sections_are_the_least_squares_circles_of_their_points(rng):
     groups = [noisy_arc(rng, a, n=40) for a in (350.0, 170.0, 100.0)] + [(np.zeros(3), np.ones(3))]
     x, y = (np.concatenate(c) for c in zip(*groups, strict=True))
     starts = np.cumsum([0, *(len(g[0]) for g in groups)])
-    fits = np.empty((4, 5))
-    fit_sections(x, y, starts, 0.04, fits)
-    for (gx, gy), row in zip(groups[:3], fits[:3], strict=True):
-        best = geometric_by_scipy(gx, gy, row[:3])
-        assert_allclose(row[:3], best, atol=1e-7)
+    circles = empty_circles(4)
+    fit_sections(x, y, starts, 0.04, circles)
+    for k, (gx, gy) in enumerate(groups[:3]):
+        found = circles.centre_x[k], circles.centre_y[k], circles.radius[k]
+        best = geometric_by_scipy(gx, gy, found)
+        assert_allclose(found, best, atol=1e-7)
         off = np.hypot(gx - best[0], gy - best[1]) - best[2]
-        assert row[3] == pytest.approx(np.sqrt((off**2).sum() / 37), rel=1e-6)
-        angle = np.sort(np.arctan2(gy - row[1], gx - row[0]))
+        assert circles.rms[k] == pytest.approx(np.sqrt((off**2).sum() / 37), rel=1e-6)
+        angle = np.sort(np.arctan2(gy - found[1], gx - found[0]))
         steps = np.diff(angle, append=angle[0] + 2 * np.pi)
-        assert row[4] == pytest.approx(steps[steps <= 0.04 / row[2]].sum())
-    assert np.isnan(fits[3]).all()
+        assert circles.arc[k] == pytest.approx(steps[steps <= 0.04 / found[2]].sum())
+    assert np.isnan([column[3] for column in circles]).all()

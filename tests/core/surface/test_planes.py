@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 
 from pipecore.geometry import LineAxis
 from pipecore.surface.planes import (
-    CELL,
+    CELL_VOXELS,
     NO_PLANE,
     find_planes,
     planes_of_points,
@@ -16,7 +16,7 @@ from tests.core.shapes import known, part_of, plane, random_rotation, tube, unit
 
 MAX_RADIUS = 5.0
 SPACING = 0.02
-EDGE = CELL * SPACING
+EDGE = CELL_VOXELS * SPACING
 
 
 def tilted(rng, part, angle=0.05):

@@ -46,10 +46,10 @@ N_STEPS = 6
 MIN_POINTS, LEAST_ON_BEND = 15, 12
 """Points that a bend is fitted to, and those for which one is tried."""
 PAIRS_AT_ONCE = 200
-"""Pairs of ends that one thread looks at; of most a glance tells that they do not meet."""
+"""Pairs of ends that one thread tests at a time; most are rejected at once."""
 MAX_POINTS = 20_000
 FREE_SD = 0.015
-"""A bend whose own points carry its bend radius to this share needs no straights for it."""
+"""A bend whose points determine its bend radius to this share needs no straights for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +284,7 @@ def fit_bend(
     Returns
     -------
     FittedElement or None
-        None where the points do not carry the bend radius. Its covariance is that of a
+        None where the bend radius is not well determined. Its covariance is that of a
         torus whose other parameters are known.
     """
     radius = corner.radius

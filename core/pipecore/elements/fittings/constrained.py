@@ -33,7 +33,7 @@ class FittingInliers(NamedTuple):
     residual : ndarray, shape (n,)
         Signed distance from its surface, metres.
     normal_angle : ndarray, shape (n,)
-        From the surface's normal to the point's own, towards increasing clock, radians.
+        From the surface's normal to the point's, towards increasing clock, radians.
     """
 
     points: NDArray[np.intp]
@@ -61,7 +61,7 @@ def complete_fitting(
     inliers : FittingInliers
     nearby : NearbyPoints
     is_well_determined : callable
-        Whether a free fit to the fitting's own points needs no straights.
+        Whether a free fit to the fitting's points needs no straights.
 
     Returns
     -------

@@ -14,7 +14,7 @@ from scipy import ndimage
 
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.fitted_element import FittedElement
-from pipecore.elements.refinement.nearby_points import OUTER, NearbyPoints
+from pipecore.elements.refinement.nearby_points import OUTER_RADII, NearbyPoints
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs.ends import LineIndex, Link
 from pipecore.geometry import LineAxis
@@ -90,7 +90,7 @@ def _shell(
 ) -> _Shell:
     """Free downsampled points wider than the pipe that do not face along it."""
     widest = min(FLANGE_RATIO[1] * radius, radius + MAX_OVERHANG)
-    near = nearby.around_axis(axis, widest / OUTER, REACH * radius + LONGEST)
+    near = nearby.around_axis(axis, widest / OUTER_RADII, REACH * radius + LONGEST)
     near = near[is_free[near]]
     chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[near])
     up, right = axis.frame(chainage)
@@ -168,8 +168,8 @@ def _fit_ring(
     voxel = nearby.surface.voxel
     near = (shell.chainage > ends[0] - voxel) & (shell.chainage < ends[1] + voxel)
     near &= (np.abs(shell.rho - radius) < 2.0 * tolerance) & is_free[shell.index]
-    own = shell.index[near]
-    _, xyz, _ = nearby.full_resolution_with_normals(own)
+    inliers = shell.index[near]
+    _, xyz, _ = nearby.full_resolution_with_normals(inliers)
     if len(xyz) < MIN_POINTS:
         return None
     chainage, rho, clock = axis.pipe_coordinates(xyz)
@@ -199,7 +199,7 @@ def _fit_ring(
     model = LineSurface(axis.at(0.5 * (low + high)), axis.direction, radius)
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
     ring = LineAxis(start, axis.direction, float(high - low))
-    return FittedElement(fit, ring, own, Extent(0.0, ring.length, arc, 1.0, ()), misfit)
+    return FittedElement(fit, ring, inliers, Extent(0.0, ring.length, arc, 1.0, ()), misfit)
 
 
 def pair_flanges(fitted: list[FittedElement]) -> list[Link]:

@@ -21,20 +21,20 @@ from pipecore.robust import sample_evenly
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-AHEAD, ASIDE = 4.0, 3.0
-"""Points are looked at so many radii ahead of an end and beside its line."""
+REACH_AHEAD_RADII, REACH_ASIDE_RADII = 4.0, 3.0
+"""Points are taken up to so many radii ahead of an end and beside its line."""
 MAX_POINTS = 400
 MIN_POINTS = 20
-STARTS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Where the bend may begin, in radii beyond the end: it may have been followed, or be hidden."""
+START_RADII = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+"""Where the bend may begin, in radii beyond the end: inside the straight, or hidden beyond it."""
 BEND_RADII = 1.3 * 1.14 ** np.arange(16.0)
 AZIMUTHS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
-MAX_ANGLE = np.deg2rad(100.0)
-MIN_ANGLE, ANGLE_STEP = np.deg2rad(12.0), np.deg2rad(3.0)
-BETTER = 1.3
-"""A bend explains so many times as many points as the straight would if it went on."""
-BEYOND, OFF = 3.0, 0.1
-"""A straight is looked for over so many radii beyond a bend, its points so many radii off."""
+MAX_BEND_ANGLE = np.deg2rad(100.0)
+MIN_BEND_ANGLE, ANGLE_STEP = np.deg2rad(12.0), np.deg2rad(3.0)
+MIN_POINT_RATIO = 1.3
+"""A bend has at least so many times as many points as the straight would if it went on."""
+STRAIGHT_LENGTH_RADII, STRAIGHT_BAND_RADII = 3.0, 0.1
+"""Length over which a straight beyond a bend is searched, and largest distance of its points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class ViewFromEnd:
         cosine = (outward * along_normal + aside * (n_b * cos - n_a * sin)) / rho
         angle = np.arctan2(s, -back)
         on = (np.abs(rho - 1.0) < tolerance) & (np.abs(cosine) > RADIAL_COS)
-        on &= (angle > 0) & (angle < min(MAX_ANGLE, AHEAD / bend_radius))
+        on &= (angle > 0) & (angle < min(MAX_BEND_ANGLE, REACH_AHEAD_RADII / bend_radius))
         return on, angle
 
     def best_of(
@@ -70,7 +70,7 @@ class ViewFromEnd:
         """The bend that most points are on: how many, its start, bend radius and azimuth."""
         count, i, j, k = kernels.best_follower(
             self.place, self.normal, starts, bend_radii, np.cos(azimuths), np.sin(azimuths),
-            tolerance, RADIAL_COS, MAX_ANGLE, AHEAD,
+            tolerance, RADIAL_COS, MAX_BEND_ANGLE, REACH_AHEAD_RADII,
         )  # fmt: skip
         return int(count), float(starts[i]), float(bend_radii[j]), float(azimuths[k])
 
@@ -87,7 +87,7 @@ class ViewFromEnd:
 def extend_open_end(
     end: StraightEnd, nearby: NearbyPoints, is_free: Flags
 ) -> tuple[Proposal, Proposal | None] | None:
-    """Look for a bend at the end of a straight.
+    """Search a bend at the end of a straight, and the straight beyond it.
 
     Parameters
     ----------
@@ -104,11 +104,11 @@ def extend_open_end(
     radius, origin, ahead = end.radius, end.point, end.outward
     side = unit(cross(np.eye(3)[np.argmin(np.abs(ahead))], ahead))
     frame = np.stack([ahead, side, cross(ahead, side)])
-    reach = np.hypot(AHEAD, ASIDE) * radius
+    reach = np.hypot(REACH_AHEAD_RADII, REACH_ASIDE_RADII) * radius
     ball = nearby.within_ball(origin, reach)
     ball = ball[is_free[ball] & np.isfinite(nearby.surface.normals[ball, 0])]
     place = frame @ (nearby.surface.xyz[ball] - origin).T / radius
-    near = (place[0] > STARTS[0]) & (np.hypot(place[1], place[2]) < ASIDE)
+    near = (place[0] > START_RADII[0]) & (np.hypot(place[1], place[2]) < REACH_ASIDE_RADII)
     if near.sum() < MIN_POINTS:
         return None
     rows = sample_evenly(np.flatnonzero(near), MAX_POINTS)
@@ -117,8 +117,8 @@ def extend_open_end(
         np.ascontiguousarray(frame @ nearby.surface.normals[ball[rows]].T),
     )
     tolerance = max(3.0 * nearby.surface.noise / radius, 0.03)
-    best = view.best_of(STARTS, BEND_RADII, AZIMUTHS, tolerance)
-    if best[0] < max(MIN_POINTS, BETTER * view.straight_on(tolerance)):
+    best = view.best_of(START_RADII, BEND_RADII, AZIMUTHS, tolerance)
+    if best[0] < max(MIN_POINTS, MIN_POINT_RATIO * view.straight_on(tolerance)):
         return None
     _, start, bend_radius, azimuth = best
     fine = np.linspace(-1.0, 1.0, 7)
@@ -139,8 +139,8 @@ def extend_open_end(
     )
     on, angle = view.bent(start, bend_radius, np.array([azimuth]), tolerance)
     low = float(arc_angles(bend, begin[None])[0])
-    piece = Proposal(bend, NO_ELLIPSES, low, low + float(np.quantile(angle[on], 0.98)))
-    return piece, _straight_beyond(bend, inward, ahead, nearby, is_free)
+    proposal = Proposal(bend, NO_ELLIPSES, low, low + float(np.quantile(angle[on], 0.98)))
+    return proposal, _straight_beyond(bend, inward, ahead, nearby, is_free)
 
 
 def _straight_beyond(
@@ -151,10 +151,10 @@ def _straight_beyond(
     is_free: Flags,
 ) -> Proposal | None:
     """The straight, of those that leave a bend at some angle, that most points are on."""
-    radius, half = bend.radius, 0.5 * BEYOND * bend.radius
-    tolerance = max(3.0 * nearby.surface.noise, OFF * radius)
+    radius, half = bend.radius, 0.5 * STRAIGHT_LENGTH_RADII * bend.radius
+    tolerance = max(3.0 * nearby.surface.noise, STRAIGHT_BAND_RADII * radius)
     best, most = None, MIN_POINTS - 1
-    for turn in np.arange(MIN_ANGLE, MAX_ANGLE, ANGLE_STEP):
+    for turn in np.arange(MIN_BEND_ANGLE, MAX_BEND_ANGLE, ANGLE_STEP):
         direction = np.cos(turn) * ahead + np.sin(turn) * inward
         out = np.sin(turn) * ahead - np.cos(turn) * inward
         model = LineSurface(

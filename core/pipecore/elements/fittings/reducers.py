@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 ON_AXIS, MAX_LEAN = 0.12, np.deg2rad(6.0)
 """Axes of straights joined by a reducer pass each other within this share of the radius, and
-lean to each other by no more than this angle."""
+enclose no more than this angle."""
 NARROWEST, WIDEST = 0.4, 0.96
 """Radii of the narrow end, in those of the wide one."""
 MIN_PIPE = 1.5
@@ -46,13 +46,13 @@ wider end."""
 FACING = np.cos(np.deg2rad(50.0))
 """Points whose normals are further from a radius of the pipe are of something else."""
 MIN_POINTS, MOST_POINTS = 12, 1500
-"""Points on a reducer at least, and how many tell at most where it begins and ends."""
+"""Points on a reducer at least, and how many are used at most to find where it begins and ends."""
 LEAST_SIGMA = 0.0005
 """Points are not believed to scatter less than this about a cone, metres."""
 MIN_SHARE = 0.6
 """Of the points between the radii of both straights so many lie on a reducer."""
 FREE_SD = 0.006
-"""A reducer whose own points carry its radius to this share needs no straights for it."""
+"""A reducer whose points determine its radius to this share needs no straights for it."""
 
 
 def find_steps(fitted: list[FittedElement]) -> list["RadiusStep"]:
@@ -203,7 +203,7 @@ def fit_reducer(
     Returns
     -------
     FittedElement or None
-        None where no cone joins the straights. Unless its own points carry it, its radius
+        None where no cone joins the straights. Unless its points determine it, its radius
         is as sure as those of the straights.
     """
     before, after = (min(OVERSHOOT * step.wide, 0.5 * s.axis.length) for s in straights)

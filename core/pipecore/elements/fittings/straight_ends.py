@@ -56,7 +56,7 @@ def straight_ends(fitted: list[FittedElement], first: int = 0) -> list[StraightE
 
 
 def normal_angle(normals: Array, outward: Array, tangent: Array) -> Array:
-    """Angle from the surface's normals to the points' own, towards increasing clock.
+    """Angle from the surface's normals to the points', towards increasing clock.
 
     Parameters
     ----------

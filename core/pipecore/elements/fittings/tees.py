@@ -1,4 +1,4 @@
-"""Tees: where a branch meets the side of a run, with the piece of run around it.
+"""Tees: where a branch meets the side of a run, with the part of the run around it.
 
 A scan does not show the welds of a tee, so its length is that of a standard one of the
 run's size, ASME B16.9: from the branch's axis to either end 25 mm and 0.7 of the run's
@@ -29,7 +29,7 @@ MIN_BRANCH = 0.38
 CENTRE_TO_END = (0.025, 0.7)
 """Metres, and outside diameters more."""
 MIN_REST = 0.7
-"""What is left of the run beside a tee is a pipe of its own from so many radii on."""
+"""What is left of the run beside a tee is a separate pipe from so many radii on."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
                 max_skew = MAX_FAR_SKEW if is_far else MAX_SKEW
                 if sine > BRANCH_SIN and skew < max_skew * radius and towards @ outward > 0:
                     # Where the axes meet, not where the branch ends, is a lateral's middle.
-                    lean = float(outward @ run.axis.direction) / sine
-                    middle = float(chainage[0]) + lean * float(rho[0])
+                    slope = float(outward @ run.axis.direction) / sine
+                    middle = float(chainage[0]) + slope * float(rho[0])
                     is_wide = branch.radii[end] > MIN_BRANCH * radius
                     found.append(Junction(i, j, middle, is_wide))
     return found
@@ -168,23 +168,23 @@ def cut_tees(
             if high - low < 1e-9:
                 continue
             upto = high if high < axis.length else np.inf
-            own = found.inliers[(chainage >= at) & (chainage < upto)]
+            inliers = found.inliers[(chainage >= at) & (chainage < upto)]
             at = upto
-            piece = _cut(found, axis, low, high, own)
-            parts.append(ElementPart(piece, piece.axis, i, is_tee=k % 2 == 1))
+            part = _cut(found, axis, low, high, inliers)
+            parts.append(ElementPart(part, part.axis, i, is_tee=k % 2 == 1))
     return parts
 
 
 def _cut(
-    run: FittedElement, axis: LineAxis, low: float, high: float, own: NDArray[np.intp]
+    run: FittedElement, axis: LineAxis, low: float, high: float, inliers: NDArray[np.intp]
 ) -> FittedElement:
     """The stretch of a run between two chainages of its trimmed axis."""
-    piece = LineAxis(axis.at(low), axis.direction, high - low)
-    shift = float(run.axis.pipe_coordinates(piece.start[None])[0][0])
+    part = LineAxis(axis.at(low), axis.direction, high - low)
+    shift = float(run.axis.pipe_coordinates(part.start[None])[0][0])
     gaps = tuple(
-        (max(a - shift, 0.0), min(b - shift, piece.length))
+        (max(a - shift, 0.0), min(b - shift, part.length))
         for a, b in run.extent.gaps
-        if b > shift and a < shift + piece.length
+        if b > shift and a < shift + part.length
     )
-    extent = Extent(0.0, piece.length, run.extent.arc, run.extent.coverage, gaps)
-    return replace(run, axis=piece, inliers=own, extent=extent)
+    extent = Extent(0.0, part.length, run.extent.arc, run.extent.coverage, gaps)
+    return replace(run, axis=part, inliers=inliers, extent=extent)

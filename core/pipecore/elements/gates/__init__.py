@@ -1,1 +1,1 @@
-"""Gates: what a refined piece must show before it counts as an element."""
+"""Gates: what a fitted proposal must show to be an element."""

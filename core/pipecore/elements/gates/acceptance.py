@@ -28,9 +28,9 @@ MIN_COVERAGE = 0.5
 """Share of an element's length that must be covered by points."""
 MIN_ARC, MIN_BEND_ARC = np.deg2rad(55.0), np.deg2rad(75.0)
 MIN_SHARP_ARC, VERY_SHARP_RADIUS_SD = np.deg2rad(36.0), 0.005
-"""A straight may show less than `MIN_ARC` where the points carry the radius to this share."""
+"""A straight may show less than `MIN_ARC` where the radius is determined to this share."""
 SURE_ARC, SHARP_RADIUS_SD, LONG_RADIUS_SD = np.deg2rad(100.0), 0.010, 0.035
-"""On shorter arcs the points must carry the radius to this share of it, or to the latter ..."""
+"""On shorter arcs the radius must be determined to this share of it, or to the latter ..."""
 LONG = 3.0
 """... where a straight is longer than this many radii: no corner and no chance is."""
 MIN_BEND_RADIUS, MIN_BEND_LENGTH = 1.02, 0.4

@@ -19,7 +19,7 @@ CELL_WIDTH, SECTORS = 0.03, (12, 24)
 """Width of a cell around the axis, metres, and the least and most cells around it."""
 MIN_IN_CELL, MIN_CELLS = 4, 12
 OVAL_ARC = np.deg2rad(200.0)
-"""From this arc on an oval section can be told from a round one that is off centre."""
+"""From this arc on an oval section can be distinguished from a round one that is off centre."""
 MIN_SIGNIFICANCE = 4.0
 """Cells are wavy if their scatter exceeds that of noise by this many standard deviations."""
 N_STEPS = 8

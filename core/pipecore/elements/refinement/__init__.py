@@ -1,1 +1,1 @@
-"""Refinement: a robust geometric fit of each piece to the full-resolution points around it."""
+"""Refinement: a robust geometric fit of each proposal to the full-resolution points around it."""

@@ -11,30 +11,29 @@ from pipecore._kernels import misfit as misfit_kernels
 
 Array = NDArray[np.float64]
 
-MAX_GAP = 4.0
-"""An element goes on across gaps of this many radii, or of `MAX_GAP_LENGTH`."""
-MAX_GAP_LENGTH = 0.25
+MAX_GAP_RADII = 4.0
+"""An element goes on across gaps of this many radii, or of `MAX_GAP_M`."""
+MAX_GAP_M = 0.25
 MIN_REPORTED_GAP_RADII = 2.0
 """Gaps of at least this many radii are reported."""
-MIN_COVERED_ARC = float(np.deg2rad(50.0))
-"""... or `ENOUGH_OF_ARC` of what it usually shows."""
-ENOUGH_OF_ARC = 0.8
-SHARE_OF_ARC = 0.45
-"""A step of axis is covered if it shows this share of the arc that the element usually shows."""
-OVAL_ARC = float(np.deg2rad(200.0))
-MAX_OVAL = 0.05
-"""From this arc on an oval section can be told, up to this amplitude in radii."""
-OVAL_SHARE = 0.6
+MIN_ARC_SHARE = 0.45
+"""A step of axis is covered if it shows this share of the element's usual arc, and ..."""
+MIN_COVERED_ARC, MIN_COVERED_ARC_SHARE = float(np.deg2rad(50.0)), 0.8
+"""... this arc, or the latter share of the usual one where that is less."""
+MIN_OVAL_ARC = float(np.deg2rad(200.0))
+MAX_OVAL_RADII = 0.05
+"""From this arc on an oval section can be distinguished, up to this amplitude in radii."""
+MAX_OVAL_RESIDUAL_SHARE = 0.6
 """An oval section leaves at most this share of what a round one does: a bow leaves more."""
 MIN_TURNING = 0.4
 """Normals turn with the clock by at least this share of what a round surface's do."""
 MAX_SECTORS = 36
-LEAST_IN_SECTOR = 5, 0.02
-"""Sectors of fewer points, or of a smaller share of all, tell nothing of the section."""
+MIN_IN_SECTOR = 5, 0.02
+"""Sectors of fewer points, or of a smaller share of all, are not used for the section."""
 MIN_NARROWER_ARC = float(np.deg2rad(75.0))
 """A dent shows less of an arc inside the surface than a narrower pipe does."""
-LONGEST_STEP = 0.03
-"""Ends of wide vessels are to be found as well as those of pipes, metres."""
+MAX_STEP_M = 0.03
+"""Longest step, metres: ends of wide vessels are found as well as those of pipes."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def find_extent(
     chainage, clock, residual : ndarray, shape (n,)
         Of the points near the surface.
     normal_angle : ndarray, shape (n,)
-        Angle from the surface's normal to each point's own, towards increasing clock.
+        Angle from the surface's normal to each point's, towards increasing clock.
     inside : callable
         Asked, only where there are gaps, for chainage and clock, shape (2, m), of the points
         well inside the surface whose normals agree with it, between two chainages.
@@ -101,7 +100,7 @@ def find_extent(
     """  # fmt: skip
     if len(chainage) == 0:
         return None
-    step = max(2.0 * spacing, min(0.15 * radius, LONGEST_STEP))
+    step = max(2.0 * spacing, min(0.15 * radius, MAX_STEP_M))
     base = float(chainage.min())
     # A sector is wide enough to hold a point wherever the surface is seen.
     n_sectors = int(min(max(2 * np.pi * radius / (2.0 * spacing), 12), MAX_SECTORS))
@@ -109,8 +108,8 @@ def find_extent(
     max_off = 1.2 * sigma + min(0.006 * radius, 0.0015)
     arc, covered, n_core = kernels.cover_rows(
         chainage, clock, residual, normal_angle, length, radius, base, step, n_sectors,
-        (SHARE_OF_ARC, MIN_COVERED_ARC, ENOUGH_OF_ARC, max_off,
-         OVAL_ARC, MAX_OVAL, OVAL_SHARE, MIN_TURNING),
+        (MIN_ARC_SHARE, MIN_COVERED_ARC, MIN_COVERED_ARC_SHARE, max_off,
+         MIN_OVAL_ARC, MAX_OVAL_RADII, MAX_OVAL_RESIDUAL_SHARE, MIN_TURNING),
     )  # fmt: skip
     if n_core == 0:
         return None
@@ -120,7 +119,7 @@ def find_extent(
         begin, end = covered[gaps[0]] + 1, covered[gaps[-1] + 1]
         at, around = inside(base + begin * step, base + end * step)
         arcs_inside = kernels.arcs_in_gaps(at, around, base, step, covered, MAX_SECTORS)
-    longest_gap = max(MAX_GAP * radius, MAX_GAP_LENGTH)
+    longest_gap = max(MAX_GAP_RADII * radius, MAX_GAP_M)
     place, place_last = kernels.best_part(
         covered, arcs_inside, base, step, length, longest_gap, MIN_NARROWER_ARC
     )
@@ -142,10 +141,10 @@ def find_extent(
 def section_misfit(clock: Array, residual: Array, arc: float) -> float:
     """How far the mean section leaves the shapes that a pipe has, root mean square in metres.
 
-    Those shapes are the circle and, where the arc can tell, the oval. Corners of boxes
-    and the flanges of beams keep a residual of their own in every sector around the axis.
+    Those shapes are the circle and, on long arcs, the oval. Corners of boxes
+    and the flanges of beams keep a residual in every sector around the axis.
     """
-    n_harmonics = 2 if arc > OVAL_ARC else 1
+    n_harmonics = 2 if arc > MIN_OVAL_ARC else 1
     return float(
-        misfit_kernels.section_misfit(clock, residual, MAX_SECTORS, *LEAST_IN_SECTOR, n_harmonics)
+        misfit_kernels.section_misfit(clock, residual, MAX_SECTORS, *MIN_IN_SECTOR, n_harmonics)
     )

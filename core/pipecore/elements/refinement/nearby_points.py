@@ -21,11 +21,11 @@ from pipecore.types import PointCloud
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-INNER, OUTER = 0.4, 1.3
+INNER_RADII, OUTER_RADII = 0.4, 1.3
 """The neighbourhood of an axis, in radii: deep dents inside, what touches outside."""
-REACH_OF_SPHERE = 1.2
+MAX_SPHERE_RADII = 1.2
 """The same of a sphere."""
-CELL_VOXELS, COARSE = 6.0, 4
+CELL_VOXELS, COARSE_CELLS = 6.0, 4
 """Edge of the cells in which points are looked up, in voxels; of coarse cells, in fine ones."""
 
 RADIAL_COS = float(np.cos(np.deg2rad(30.0)))
@@ -49,7 +49,7 @@ class PointsOnSurface:
     inliers : ndarray of int, shape (n,)
     residual, chainage, clock, normal_angle : ndarray, shape (n,)
         Distance from the surface, pipe coordinates, and the angle from the surface's normal
-        to the point's own, towards increasing clock.
+        to the point's, towards increasing clock.
     inside : callable
         Takes the chainages between which it is asked for, and returns chainage and clock of
         the points well inside the surface whose normals agree with it, shape (2, m).
@@ -79,10 +79,10 @@ class PointsOnSurface:
         )
 
 
-def _in_order_met(
+def _number_by_first_use(
     keys: NDArray[np.int64],
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Ids of keys in the order in which they are met, and the key of each id."""
+    """Number keys in the order in which they first occur; also the key of each number."""
     known, at, place = np.unique(keys, return_index=True, return_inverse=True)
     order = np.argsort(at)
     ids = np.empty(len(known), np.int32)
@@ -91,7 +91,7 @@ def _in_order_met(
 
 
 class NearbyPoints:
-    """Looks up downsampled points around an axis, and the cloud's points behind them.
+    """Looks up downsampled points around an axis, and the cloud's points that they are means of.
 
     Parameters
     ----------
@@ -124,9 +124,9 @@ class NearbyPoints:
         progress.update("elements", FRACTION_AT_START)
         numbers = counter.keys
         place = np.stack([numbers // (n_y * n_z), numbers // n_z % n_y, numbers % n_z], axis=1)
-        coarse_y, coarse_z = n_y // COARSE + 1, n_z // COARSE + 1
-        x, y, z = (place // COARSE).T
-        coarse, coarse_numbers = _in_order_met((x * coarse_y + y) * coarse_z + z)
+        coarse_y, coarse_z = n_y // COARSE_CELLS + 1, n_z // COARSE_CELLS + 1
+        x, y, z = (place // COARSE_CELLS).T
+        coarse, coarse_numbers = _number_by_first_use((x * coarse_y + y) * coarse_z + z)
         table = table_of(coarse_numbers)
         order, cell_starts = group_by_label(coarse, len(coarse_numbers))
         middles = (first + place[order] + 0.5) * edge
@@ -137,16 +137,16 @@ class NearbyPoints:
         points = allocate("points_of_cells", (len(cell),), np.int32)
         starts = group_into(cell, len(order), points)
         self._grid = cell_search.PointCells(
-            np.asarray(first * edge, np.float64), COARSE * edge, coarse_y, coarse_z, table,
+            np.asarray(first * edge, np.float64), COARSE_CELLS * edge, coarse_y, coarse_z, table,
             cell_starts, middles, 0.5 * np.sqrt(3.0) * edge + 1e-6, points, starts,
         )  # fmt: skip
 
     def around_axis(
-        self, axis: Axis, radius: float, margin: float, inner: float = INNER
+        self, axis: Axis, radius: float, margin: float, inner: float = INNER_RADII
     ) -> Indices:
         """Downsampled points from `inner` radii off `axis` on, up to `margin` beyond its ends."""
         tube = cell_search.Tube(
-            axis.numbers, inner * radius, OUTER * radius, -margin, axis.length + margin
+            axis.numbers, inner * radius, OUTER_RADII * radius, -margin, axis.length + margin
         )
         cells = cell_search.cells_around(self._grid, tube)
         return np.asarray(point_search.points_around(self.surface.xyz, self._grid, cells, tube))
@@ -169,7 +169,7 @@ class NearbyPoints:
         ----------
         model : SurfaceModel
         axis : Axis
-            Its own.
+            Of the surface.
         margin : float
             How far beyond the axis's ends points are looked for, metres.
         is_free : ndarray of bool
@@ -181,7 +181,7 @@ class NearbyPoints:
         is_rough : bool
             Whether a sample of the points will do where there are many.
         """
-        inner, outer = INNER * model.radius, OUTER * model.radius
+        inner, outer = INNER_RADII * model.radius, OUTER_RADII * model.radius
         points = point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
         target = point_search.Target(model.kind, model.numbers(), band, depth, min_cos)
         tube = cell_search.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)
@@ -191,19 +191,21 @@ class NearbyPoints:
             shell = tube._replace(
                 inner=max(inner, model.radius - band), outer=min(outer, model.radius + band)
             )
-        own, columns, spacing = point_search.points_on_surface(
+        inliers, columns, spacing = point_search.points_on_surface(
             points, self.surface.spacing, self.surface.voxel, self._grid, tube, shell, target,
             ROUGH_SAMPLE_POINTS if is_rough else 0,
         )  # fmt: skip
 
-        def look_inside(begin: float, end: float) -> Array:
+        def find_inside(begin: float, end: float) -> Array:
             part = tube._replace(begin=begin, end=end)
             cells = cell_search.cells_around(self._grid, part)
             found: Array = point_search.points_inside(points, self._grid, cells, part, target)
             return found
 
         residual, chainage, clock, normal_angle = columns
-        return PointsOnSurface(own, residual, chainage, clock, normal_angle, look_inside, spacing)
+        return PointsOnSurface(
+            inliers, residual, chainage, clock, normal_angle, find_inside, spacing
+        )
 
     def on_sphere(
         self,
@@ -214,11 +216,11 @@ class NearbyPoints:
         min_cos: float,
         is_rough: bool = False,
     ) -> Indices:
-        """Free downsampled points within `band` of a sphere whose normals are like its own.
+        """Free downsampled points within `band` of a sphere whose normals agree with it.
 
-        A rough look takes a sample of them where there are many.
+        With `is_rough`, a sample of them where there are many.
         """
-        outer = min(model.radius + band, REACH_OF_SPHERE * model.radius)
+        outer = min(model.radius + band, MAX_SPHERE_RADII * model.radius)
         inner = model.radius - band
         cells = cell_search.cells_in_shell(self._grid, model.centre, inner, outer)
         stride = point_search.stride_of(self._grid, cells, ROUGH_SAMPLE_POINTS if is_rough else 0)
@@ -243,12 +245,12 @@ class NearbyPoints:
         )
 
     def full_resolution(self, downsampled: Indices) -> tuple[Indices, Array]:
-        """Indices and coordinates of the cloud's points behind downsampled points.
+        """Indices and coordinates of the cloud's points in the voxels of downsampled points.
 
-        Those behind one downsampled point are in the order of their coordinates, so that the
-        cloud's own order does not matter.
+        Those of one voxel are in the order of their coordinates, so that the
+        order of the cloud does not matter.
         """
-        n = int(self._n_behind(downsampled).sum())
+        n = int(self._n_in_voxel(downsampled).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
         point_search.full_resolution_points(
             self._members, self._starts, downsampled, self._cloud.xyz, index, xyz
@@ -256,10 +258,12 @@ class NearbyPoints:
         return index, xyz
 
     def full_resolution_with_normals(self, downsampled: Indices) -> tuple[Indices, Array, Array]:
-        """What `behind` tells, and the normals of the downsampled points, one for each point."""
+        """As `full_resolution`, with the normals of the downsampled points, one for each point."""
         index, xyz = self.full_resolution(downsampled)
-        normals = np.repeat(self.surface.normals[downsampled], self._n_behind(downsampled), axis=0)
+        normals = np.repeat(
+            self.surface.normals[downsampled], self._n_in_voxel(downsampled), axis=0
+        )
         return index, xyz, normals
 
-    def _n_behind(self, downsampled: Indices) -> Indices:
+    def _n_in_voxel(self, downsampled: Indices) -> Indices:
         return np.asarray(self._starts[downsampled + 1] - self._starts[downsampled], np.intp)

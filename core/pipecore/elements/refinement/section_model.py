@@ -3,8 +3,8 @@
 A pipe may be oval and three-lobed, changing slowly along it, and bowed or sagging. As heights
 above the fitted surface these are harmonics of the clock (first: the axis; second: ovality; third:
 lobes) times Legendre polynomials of the chainage. What is left after that is the scatter of
-the surface, by which a pipe is told from what is none: a circle's scatter would count ovality
-as roughness, and lose pipes the surer the more deformed they are.
+the surface, by which pipes and clutter differ: the scatter about a circle would count
+ovality as roughness and reject the most deformed pipes first.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from pipecore._kernels import section_models as kernels
 Array = NDArray[np.float64]
 
 OVAL_ARC, LOBED_ARC = np.deg2rad(150.0), np.deg2rad(220.0)
-"""From these arcs on an oval and a three-lobed section are told from a round one off centre."""
+"""Arcs from which on an oval and a three-lobed section differ from a round one off centre."""
 PRIOR = 0.04
 """Scatter of the harmonics' amplitudes over pipes, in radii."""
 MAX_HEIGHT = 0.09
@@ -92,12 +92,12 @@ def fit_section_model(
     radius : float
         Of the surface, metres.
     arc : float
-        That is seen of it, radians: what a short arc cannot carry is not fitted.
+        That is seen of it, radians: what a short arc does not determine is not fitted.
 
     Returns
     -------
     SectionModel or None
-        None where the points carry none.
+        None where the points determine none.
     """
     if len(chainage) < MIN_POINTS:
         return None

@@ -1,8 +1,8 @@
 """Cylinders, cones, tori and spheres fitted to points: robust geometric least squares.
 
 Residuals are signed distances along the radius, positive outside. The arithmetic is that
-of `pipecore._kernels.surface_models`, which also tells the parameters of each kind; here are the
-surfaces' names, and what a fit tells of them.
+of `pipecore._kernels.surface_models`, which documents the parameters of each kind; here are the
+surfaces as classes, and the result of a fit.
 """
 
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ Model = TypeVar("Model", bound=SurfaceModel)
 
 
 class _Measured:
-    """What all surfaces do by the kernels."""
+    """Residuals by the kernels, for all surfaces."""
 
     def residuals(self: SurfaceModel, xyz: Array) -> tuple[Array, Array, Array]:
         """Signed distances (n,), derivatives (n, p) and outward unit vectors (n, 3)."""
@@ -111,7 +111,7 @@ class LineSurface(_Measured):
 
     @property
     def position(self) -> Array:
-        """A point that tells it from others."""
+        """A point by which two surfaces of one kind are compared."""
         return self.middle
 
     def numbers(self) -> Array:
@@ -152,7 +152,7 @@ class ArcSurface(_Measured):
 
     @property
     def position(self) -> Array:
-        """A point that tells it from others."""
+        """A point by which two surfaces of one kind are compared."""
         return self.centre
 
     def numbers(self) -> Array:
@@ -184,7 +184,7 @@ class SphereSurface(_Measured):
 
     @property
     def position(self) -> Array:
-        """A point that tells it from others."""
+        """A point by which two surfaces of one kind are compared."""
         return self.centre
 
     def numbers(self) -> Array:
@@ -198,7 +198,7 @@ class SphereSurface(_Measured):
 
 @dataclass(frozen=True, eq=False)
 class SurfaceFit(Generic[Model]):
-    """A fitted surface with what the fit tells of it."""
+    """A fitted surface with the covariance of its parameters and the points' standard deviation."""
 
     model: Model
     covariance: Array
@@ -239,7 +239,7 @@ def fit_surface(
     Returns
     -------
     SurfaceFit or None
-        None where the points do not carry the surface.
+        None where the surface is not well determined.
     """
     kind, numbers = model.kind, model.numbers()
     p = kernels.n_parameters(kind)

@@ -30,7 +30,7 @@ def join_straights(
     ----------
     fitted : list of FittedElement
     links : list of (int, int)
-        Pairs of pieces that belong together; renumbered.
+        Pairs of elements that belong together; renumbered.
     """
     spans = [AxisSpan(f.axis, f.radii) for f in fitted]
     pairs = [(i, j) for i, _, j, _ in meeting_ends(spans) if _are_one_pipe(fitted[i], fitted[j])]
