@@ -31,12 +31,12 @@ def test_that_turning_is_one_more_than_the_slope_of_the_lean(rng):
     group = rng.integers(0, 4, 200)
     # Around 12:00 as well, where the clock starts anew.
     around = rng.uniform(-1.0, 1.0, 200)
-    lean = -0.3 * group * around + 0.01 * rng.normal(size=200)
+    normal_angle = -0.3 * group * around + 0.01 * rng.normal(size=200)
     clock = np.mod(around + 0.1 * group, 2 * np.pi)
     turning = np.empty(5)
-    axis_rows.normal_turning(clock, lean, group, turning)
+    axis_rows.normal_turning(clock, normal_angle, group, turning)
     for k in range(4):
-        slope = np.polyfit(around[group == k], lean[group == k], 1)[0]
+        slope = np.polyfit(around[group == k], normal_angle[group == k], 1)[0]
         assert turning[k] == pytest.approx(1.0 + slope, abs=1e-9)
     assert turning[4] == 0.0
     assert_allclose(turning[:4], 1.0 - 0.3 * np.arange(4), atol=0.02)

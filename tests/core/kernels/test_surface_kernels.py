@@ -206,7 +206,7 @@ def test_that_points_on_a_surface_are_told_from_those_inside(rng, which):
     assert_allclose(found.clock, clock[on], atol=1e-12)
     clockwise = np.cross(axis.tangent(chainage[on]), outward[on])
     ahead = np.einsum("ij,ij->i", normals[on], clockwise)
-    assert_allclose(found.lean, np.arctan(ahead / cosine[on]), atol=1e-9)
+    assert_allclose(found.normal_angle, np.arctan(ahead / cosine[on]), atol=1e-9)
     for begin, end in ((-margin, axis.length + margin), (0.1, 0.6 * axis.length)):
         inside = like & (residual < -0.02) & (chainage > begin) & (chainage < end)
         assert inside.any()
