@@ -31,9 +31,9 @@ from pipecore.types import (
     Result,
 )
 
-AROUND = 2.0
+AROUND_RADII = 2.0
 """Points within this many radii of the axis take part in measuring."""
-MARGIN = 0.05
+MARGIN_M = 0.05
 """... and within this of it, metres, so that points at the edge have their neighbours."""
 
 
@@ -214,7 +214,7 @@ def points_near(cloud: PointCloud, elements: Sequence[Element]) -> NDArray[np.in
     near = np.zeros(len(cloud), np.bool_)
     for element in elements:
         axis = element.axis
-        reach = AROUND * max(element.radius, element.radius_end) + MARGIN
+        reach = AROUND_RADII * max(element.radius, element.radius_end) + MARGIN_M
         samples = axis.at(np.linspace(0.0, axis.length, 64))
         slack = reach + axis.length / 63
         low, high = samples.min(axis=0) - slack, samples.max(axis=0) + slack

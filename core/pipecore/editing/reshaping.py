@@ -23,8 +23,8 @@ MERGED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS)
 MAX_OFFSET = 0.3
 """Axes of one line or arc leave it by less than this share of the radius."""
 MAX_TURN_COS = float(np.cos(np.deg2rad(8.0)))
-SAME_RADIUS = 0.05
-MIN_PART = 0.1
+MAX_RADIUS_DIFFERENCE = 0.05
+MIN_PART_RADII = 0.1
 """Shortest part of a split element, in radii."""
 
 
@@ -133,7 +133,7 @@ def split_element(
     whole = find(result, element_id)
     if whole.kind is ElementKind.SPHERE:
         raise EditError("A sphere cannot be split.")
-    length, least = whole.axis.length, MIN_PART * whole.radius
+    length, least = whole.axis.length, MIN_PART_RADII * whole.radius
     if not least <= chainage <= length - least:
         raise EditError(
             "{element.label} is {length:.3f} m long: "
@@ -259,7 +259,7 @@ def _check_alike(parts: Sequence[Element]) -> None:
             raise EditError(
                 "{names} cannot be merged: only pipes, reducers and bends can.", names=names
             )
-        slack = SAME_RADIUS * min(first.radius, other.radius)
+        slack = MAX_RADIUS_DIFFERENCE * min(first.radius, other.radius)
         slack += 3 * float(np.nan_to_num(np.hypot(first.radius_sd, other.radius_sd)))
         if first.kind is not ElementKind.CONE and abs(first.radius - other.radius) > slack:
             raise EditError(

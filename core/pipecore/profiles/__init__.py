@@ -20,22 +20,22 @@ from pipecore.types import Stack
 MAX_SLOPE = 0.62
 """A point joins a stack only if |n·d| is below: the profile cuts its surface steeply enough."""
 
-GAP = 3.0
+GAP_VOXELS = 3.0
 """Automatic largest gap, in voxels, where points are as dense as the voxels."""
 
-GAP_IN_SPACINGS = 2.6
+GAP_SPACINGS = 2.6
 """The same where they are sparser, in local spacings."""
 
-MIN_CURVE = 6
+MIN_CURVE_POINTS = 6
 """Curves of fewer points are dropped."""
 
 MAX_PIECES = 40
 """Most pieces that one curve is split into."""
 
-MAX_GAPS = 4.0
+MAX_GAP_RATIO = 4.0
 """The largest gap where points are sparsest, in those where they are dense."""
 
-MARGIN = 12
+MARGIN_CELLS = 12
 """Empty cells between the rows of a profile: more than twice the cells of the largest gap."""
 
 POINTS_AT_A_TIME = 40_000
@@ -215,7 +215,7 @@ class _Cutter:
         self.frame = stack_frame(stack.direction)
         self._cut = stack_cut(stack, self.frame)
         self._surface, self._stack, self._max_radius = surface, stack, max_radius
-        self._gap = settings.gap_mm / 1e3 or GAP * surface.voxel
+        self._gap = settings.gap_mm / 1e3 or GAP_VOXELS * surface.voxel
         self._is_gap_fixed = bool(settings.gap_mm)
         self._is_fitted = settings.method is ProfileMethod.CURVE_FITTING
         cos_corner = np.cos(np.deg2rad(settings.corner_deg)) if self._is_fitted else -1.0
@@ -254,12 +254,12 @@ class _Cutter:
         kernels.carry_to_mid_planes(
             surface.xyz, surface.normals, points, self._cut, profile, uv, normals
         )
-        order, keys, n_v = kernels.sort_by_cell(profile, uv, self._gap, MARGIN)
+        order, keys, n_v = kernels.sort_by_cell(profile, uv, self._gap, MARGIN_CELLS)
         points, profile, uv, normals = points[order], profile[order], uv[order], normals[order]
         reach = np.full(n, self._gap)
         if not self._is_gap_fixed:
             spacing = surface.spacing[points]
-            reach = np.clip(GAP_IN_SPACINGS * spacing, self._gap, MAX_GAPS * self._gap)
+            reach = np.clip(GAP_SPACINGS * spacing, self._gap, MAX_GAP_RATIO * self._gap)
         parents = np.arange(n)
         kernels.join_neighbours(
             keys, n_v, self._gap, uv, normals, reach, self._smoothness, 0, n, parents
@@ -269,7 +269,7 @@ class _Cutter:
             return curves
         piece = np.zeros(len(curves.points), np.int64)
         limits = SplitLimits(
-            min_points=MIN_CURVE,
+            min_points=MIN_CURVE_POINTS,
             tolerance=surface.tolerance,
             max_gap=4.0 * surface.voxel,
             cos_radial=0.9,
@@ -294,7 +294,7 @@ class _Cutter:
         n_labels: int,
     ) -> Curves:
         """Group points by label; labels lie within profiles. Small groups are dropped."""
-        members, starts = group_large(label, n_labels, MIN_CURVE)
+        members, starts = group_large(label, n_labels, MIN_CURVE_POINTS)
         own, places, vectors, index = kernels.gather(points, uv, normals, profile, members, starts)
         return Curves(self._stack, self.frame, own, places, vectors, starts, index)
 

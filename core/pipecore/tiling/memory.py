@@ -103,7 +103,7 @@ def tile_bytes(n_points: int, limit: int, n_at_once: int) -> int:
 
 POLL_SECONDS, POLL_SECONDS_IN_VAIN = 0.1, 2.0
 """Between two readings of the memory in use, and after one that could not be lowered."""
-FULL = 0.8
+FULL_SHARE = 0.8
 """From this share of the limit on, pages of files are given back."""
 
 
@@ -123,10 +123,10 @@ def keeping_within(limit: int) -> Iterator[None]:
         pause = POLL_SECONDS
         while not is_over.wait(pause):
             pause = POLL_SECONDS
-            if process.memory_info().rss > FULL * limit:
+            if process.memory_info().rss > FULL_SHARE * limit:
                 drop_pages()
                 trim()
-                if process.memory_info().rss > FULL * limit:
+                if process.memory_info().rss > FULL_SHARE * limit:
                     pause = POLL_SECONDS_IN_VAIN
 
     watch = threading.Thread(target=look, name="pipecore memory", daemon=True)

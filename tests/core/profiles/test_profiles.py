@@ -9,7 +9,7 @@ from pipecore.geometry import LineAxis
 from pipecore.profiles import (
     MAX_PIECES,
     MAX_SLOPE,
-    MIN_CURVE,
+    MIN_CURVE_POINTS,
     Curves,
     cut_portions,
     segment_profiles,
@@ -111,7 +111,7 @@ def test_that_profiles_are_numbered_by_where_they_lie(rng):
     index = curves.profile_index[curves.curve_of_point]
     assert (np.floor(along / ALONG_X.width) == index).all()
     assert len(set(curves.profile_index)) == round(LENGTH / ALONG_X.width)
-    assert (np.diff(curves.starts) >= MIN_CURVE).all()
+    assert (np.diff(curves.starts) >= MIN_CURVE_POINTS).all()
     assert len(set(curves.points)) == len(curves.points)
 
 

@@ -39,16 +39,16 @@ MAX_SKEW = 0.2
 """Axes joined by a bend pass each other within this share of the radius."""
 BEND_RADII = np.geomspace(1.1, 11.0, 60)
 """Bend radii tried, in radii of the pipe."""
-OVERSHOOT = 1.5
-"""A straight may have been followed this many radii into the bend."""
+OVERSHOOT_RADII = 1.5
+"""A straight may reach this many radii into the bend."""
 N_STEPS = 6
 """Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
-MIN_POINTS, LEAST_ON_BEND = 15, 12
+MIN_POINTS, MIN_POINTS_ON_BEND = 15, 12
 """Points that a bend is fitted to, and those for which one is tried."""
 PAIRS_AT_ONCE = 200
 """Pairs of ends that one thread tests at a time; most are rejected at once."""
 MAX_POINTS = 20_000
-FREE_SD = 0.015
+MAX_FREE_RADIUS_SD = 0.015
 """A bend whose points determine its bend radius to this share needs no straights for it."""
 
 
@@ -175,7 +175,7 @@ def corner_between(
     furthest = BEND_RADII[-1] * radius * np.tan(turn / 2)
     if skew > MAX_SKEW * radius + 0.002:
         return None
-    if min(ahead, ahead_other) < -OVERSHOOT * radius or max(ahead, ahead_other) > furthest:
+    if min(ahead, ahead_other) < -OVERSHOOT_RADII * radius or max(ahead, ahead_other) > furthest:
         return None
     place = 0.5 * (one.point + ahead * one.outward + other.point + ahead_other * other.outward)
     sd_one, sd_other = (axis_sd(fitted[e.which[0]], place) for e in (one, other))
@@ -225,7 +225,7 @@ def _best_bend_radius(corner: Corner, gap: float, nearby: NearbyPoints) -> tuple
         np.stack([LineSurface(corner.place, t, radius).numbers() for t in corner.towards]),
         tried * corner.half_tangent, tolerance, RADIAL_COS, counts,
     )  # fmt: skip
-    counts = np.where(counts[:, 1] >= LEAST_ON_BEND, counts[:, 0], -1)
+    counts = np.where(counts[:, 1] >= MIN_POINTS_ON_BEND, counts[:, 0], -1)
     best = int(np.argmax(counts))
     return None if counts[best] < 0 else (int(counts[best]), float(tried[best]))
 
@@ -347,5 +347,5 @@ def _fitted(
         axis,
         FittingInliers(ball[on], chainage, clock, residual[on], angle),
         nearby,
-        lambda free: bool(np.sqrt(free.covariance[5, 5]) < FREE_SD * bend_radius),
+        lambda free: bool(np.sqrt(free.covariance[5, 5]) < MAX_FREE_RADIUS_SD * bend_radius),
     )

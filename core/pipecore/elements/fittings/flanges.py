@@ -30,8 +30,8 @@ MAX_OVERHANG = 0.2
 MIN_LENGTH, MAX_LENGTH = 0.008, 0.9
 """Length of a flange, or of a pair with its gasket: metres; radii of the flange."""
 MIN_ARC = np.deg2rad(75.0)
-REACH, LONGEST = 2.0, 0.06
-"""Flanges are looked for so many radii of the pipe beyond its ends, which may be hidden, and
+REACH_RADII, REACH_M = 2.0, 0.06
+"""Flanges are searched so many radii of the pipe beyond its ends, which may be hidden, and
 so many metres further, for their own length."""
 RADIAL_COS = 0.8
 """Normals at an edge are tilted, but those on the faces of a flange are along the pipe."""
@@ -90,7 +90,7 @@ def _shell(
 ) -> _Shell:
     """Free downsampled points wider than the pipe that do not face along it."""
     widest = min(FLANGE_RATIO[1] * radius, radius + MAX_OVERHANG)
-    near = nearby.around_axis(axis, widest / OUTER_RADII, REACH * radius + LONGEST)
+    near = nearby.around_axis(axis, widest / OUTER_RADII, REACH_RADII * radius + REACH_M)
     near = near[is_free[near]]
     chainage, rho, clock = axis.pipe_coordinates(nearby.surface.xyz[near])
     up, right = axis.frame(chainage)
@@ -211,7 +211,7 @@ def pair_flanges(fitted: list[FittedElement]) -> list[Link]:
     ]
     found = []
     lines = LineIndex([f.axis for _, f in pipes])
-    reaches = np.array([REACH * f.fit.model.radius + LONGEST for _, f in pipes])
+    reaches = np.array([REACH_RADII * f.fit.model.radius + REACH_M for _, f in pipes])
     for i, disc in pipes:
         if disc.axis.length > MAX_LENGTH * disc.fit.model.radius:
             continue
@@ -224,7 +224,7 @@ def pair_flanges(fitted: list[FittedElement]) -> list[Link]:
                 continue
             chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
             turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
-            reach = REACH * pipe.fit.model.radius + LONGEST
+            reach = REACH_RADII * pipe.fit.model.radius + REACH_M
             near = -reach < chainage[0] < pipe.axis.length + reach
             if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):
                 found.append((i, j))

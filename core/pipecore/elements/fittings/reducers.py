@@ -26,32 +26,32 @@ from pipecore.robust import robust_sd, sample_evenly
 
 Array = NDArray[np.float64]
 
-ON_AXIS, MAX_LEAN = 0.12, np.deg2rad(6.0)
+MAX_OFFSET, MAX_AXIS_ANGLE = 0.12, np.deg2rad(6.0)
 """Axes of straights joined by a reducer pass each other within this share of the radius, and
 enclose no more than this angle."""
-NARROWEST, WIDEST = 0.4, 0.96
+MIN_RADIUS_RATIO, MAX_RADIUS_RATIO = 0.4, 0.96
 """Radii of the narrow end, in those of the wide one."""
-MIN_PIPE = 1.5
+MIN_PIPE_RADII = 1.5
 """Straights that a reducer joins are longer than this many radii."""
-SHORTEST, LONGEST, WIDEST_GAP = 0.1, 5.0, 12.0
+MIN_LENGTH_RADII, MAX_LENGTH_RADII, MAX_GAP_RADII = 0.1, 5.0, 12.0
 """Lengths of a reducer, and the widest gap between straights that it may join, with what is
 hidden of them, in radii of its wider end."""
-OVERSHOOT = 1.0
-"""Straights may have been followed so many radii too far, or have ended as much too early."""
+OVERSHOOT_RADII = 1.0
+"""A straight may reach so many radii too far, or end as much too early."""
 N_TRIED = 28
 """Places tried for either end; then again between those beside the best."""
 BETWEEN = 0.35
 """Ends of a straight that is part of a reducer are no further off its axis, in radii of its
 wider end."""
-FACING = np.cos(np.deg2rad(50.0))
-"""Points whose normals are further from a radius of the pipe are of something else."""
-MIN_POINTS, MOST_POINTS = 12, 1500
+MIN_FACING_COS = np.cos(np.deg2rad(50.0))
+"""Points whose normals differ more from the radial direction are not of the reducer."""
+MIN_POINTS, MAX_POINTS = 12, 1500
 """Points on a reducer at least, and how many are used at most to find where it begins and ends."""
-LEAST_SIGMA = 0.0005
-"""Points are not believed to scatter less than this about a cone, metres."""
+MIN_SIGMA_M = 0.0005
+"""Least standard deviation of the points about a cone, metres."""
 MIN_SHARE = 0.6
 """Of the points between the radii of both straights so many lie on a reducer."""
-FREE_SD = 0.006
+MAX_FREE_RADIUS_SD = 0.006
 """A reducer whose points determine its radius to this share needs no straights for it."""
 
 
@@ -66,7 +66,7 @@ def find_steps(fitted: list[FittedElement]) -> list["RadiusStep"]:
 
 def _is_pipe(straight: FittedElement) -> bool:
     """Whether a straight is longer than a flange or the end of something else."""
-    return straight.axis.length > MIN_PIPE * straight.fit.model.radius
+    return straight.axis.length > MIN_PIPE_RADII * straight.fit.model.radius
 
 
 def _steps(ends: list[StraightEnd]) -> Iterator["RadiusStep"]:
@@ -74,7 +74,7 @@ def _steps(ends: list[StraightEnd]) -> Iterator["RadiusStep"]:
         return
     points, radii = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
     for a, one in enumerate(ends):
-        furthest = 1.1 * WIDEST_GAP * np.maximum(one.radius, radii[a + 1 :])
+        furthest = 1.1 * MAX_GAP_RADII * np.maximum(one.radius, radii[a + 1 :])
         is_near = np.square(points[a + 1 :] - one.point).sum(axis=1) < furthest**2
         for b in (np.flatnonzero(is_near) + a + 1).tolist():
             if _may_be_joined(one, ends[b]):
@@ -83,14 +83,14 @@ def _steps(ends: list[StraightEnd]) -> Iterator["RadiusStep"]:
 
 def _may_be_joined(one: StraightEnd, other: StraightEnd) -> bool:
     wide, narrow = max(one.radius, other.radius), min(one.radius, other.radius)
-    if one.which[0] == other.which[0] or not NARROWEST < narrow / wide < WIDEST:
+    if one.which[0] == other.which[0] or not MIN_RADIUS_RATIO < narrow / wide < MAX_RADIUS_RATIO:
         return False
-    if -(one.outward @ other.outward) < np.cos(MAX_LEAN):
+    if -(one.outward @ other.outward) < np.cos(MAX_AXIS_ANGLE):
         return False
     gap = other.point - one.point
     along = float(gap @ one.outward)
     across = float(np.linalg.norm(gap - along * one.outward))
-    return -OVERSHOOT * wide < along < WIDEST_GAP * wide and across <= ON_AXIS * wide
+    return -OVERSHOOT_RADII * wide < along < MAX_GAP_RADII * wide and across <= MAX_OFFSET * wide
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,11 +134,11 @@ class RadiusStep:
         ends = np.stack([straight.axis.start, straight.axis.end])
         chainage = self.chainage(ends)
         off = np.linalg.norm(ends - self.centre(self.one, chainage), axis=1)
-        reach = OVERSHOOT * self.wide
+        reach = OVERSHOOT_RADII * self.wide
         return bool(
             chainage.min() > -reach
             and chainage.max() < self.gap + reach
-            and np.ptp(chainage) < LONGEST * self.wide
+            and np.ptp(chainage) < MAX_LENGTH_RADII * self.wide
             and off.max() < BETWEEN * self.wide
         )
 
@@ -206,9 +206,9 @@ def fit_reducer(
         None where no cone joins the straights. Unless its points determine it, its radius
         is as sure as those of the straights.
     """
-    before, after = (min(OVERSHOOT * step.wide, 0.5 * s.axis.length) for s in straights)
+    before, after = (min(OVERSHOOT_RADII * step.wide, 0.5 * s.axis.length) for s in straights)
     low, high = -before, step.gap + after
-    if high - low < SHORTEST * step.wide:
+    if high - low < MIN_LENGTH_RADII * step.wide:
         return None
     around = LineAxis(step.one.point + low * step.direction, step.direction, high - low)
     points = nearby.around_axis(around, step.wide, 0.0)
@@ -216,12 +216,12 @@ def fit_reducer(
     chainage, rho, _ = around.pipe_coordinates(xyz)
     outward = (xyz - around.at(chainage)) / rho[:, None]
     cosine = np.abs(np.einsum("ij,ij->i", nearby.surface.normals[points], outward))
-    chosen = usable[points] & (cosine > FACING)
+    chosen = usable[points] & (cosine > MIN_FACING_COS)
     points, xyz = points[chosen], xyz[chosen]
     if len(points) < MIN_POINTS:
         return None
     band = max(5.0 * nearby.surface.noise, 0.005)
-    begin, end = _best_ends(step, sample_evenly(xyz, MOST_POINTS), low, high, band)
+    begin, end = _best_ends(step, sample_evenly(xyz, MAX_POINTS), low, high, band)
     return _fitted(step, begin, end, straights, nearby, points, band)
 
 
@@ -234,7 +234,7 @@ def _best_ends(
     for _ in range(2):
         for begin in begins:
             lengths = (ends - begin) / step.wide
-            possible = ends[(lengths > SHORTEST) & (lengths < LONGEST)]
+            possible = ends[(lengths > MIN_LENGTH_RADII) & (lengths < MAX_LENGTH_RADII)]
             if len(possible) == 0:
                 continue
             left = np.square(np.minimum(step.off(xyz, begin, possible), band)).sum(axis=1)
@@ -264,7 +264,7 @@ def _fitted(
     beside = between & (rho > step.narrow - band) & (rho < step.wide + band)
     if on.sum() < max(MIN_POINTS, MIN_SHARE * beside.sum()):
         return None
-    sigma = max(robust_sd(residual[on]), LEAST_SIGMA)
+    sigma = max(robust_sd(residual[on]), MIN_SIGMA_M)
     angle = normal_angle(normals[on], outward[on], axis.tangent(chainage[on]))
     sds = np.array([s.radius_sd for s in straights])
     across = sigma**2 / on.sum()
@@ -277,5 +277,5 @@ def _fitted(
         axis,
         FittingInliers(points[on], chainage[on], clock[on], residual[on], angle),
         nearby,
-        lambda free: free.radius_sd < FREE_SD * free.model.radius,
+        lambda free: free.radius_sd < MAX_FREE_RADIUS_SD * free.model.radius,
     )

@@ -23,12 +23,12 @@ MAX_SKEW = 0.25
 ENDS_WITHIN = (0.5, 1.6)
 """A branch ends where the run's surface is: so many of the run's radii from its axis."""
 MAX_GAP, MAX_FAR_SKEW = 4.0, 0.1
-"""A branch whose foot is hidden may end so many of its radii off, if it aims this well."""
-MIN_BRANCH = 0.38
-"""A branch that is narrower, in radii of the run, is a nozzle set on it: no tee is made so."""
+"""A branch whose end is hidden may end so many of its radii off, with a smaller skew."""
+MIN_BRANCH_RATIO = 0.38
+"""A branch that is narrower, in radii of the run, is a nozzle and not a tee."""
 CENTRE_TO_END = (0.025, 0.7)
 """Metres, and outside diameters more."""
-MIN_REST = 0.7
+MIN_REST_RADII = 0.7
 """What is left of the run beside a tee is a separate pipe from so many radii on."""
 
 
@@ -86,7 +86,7 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
                     # Where the axes meet, not where the branch ends, is a lateral's middle.
                     slope = float(outward @ run.axis.direction) / sine
                     middle = float(chainage[0]) + slope * float(rho[0])
-                    is_wide = branch.radii[end] > MIN_BRANCH * radius
+                    is_wide = branch.radii[end] > MIN_BRANCH_RATIO * radius
                     found.append(Junction(i, j, middle, is_wide))
     return found
 
@@ -105,7 +105,7 @@ def tee_ends(chainages: list[float], length: float, radius: float) -> list[tuple
         Of the run, metres.
     """
     least, diameters = CENTRE_TO_END
-    reach, rest = least + diameters * 2 * radius, MIN_REST * radius
+    reach, rest = least + diameters * 2 * radius, MIN_REST_RADII * radius
     middles: list[float] = []
     for chainage in sorted(chainages):
         if not middles or chainage - middles[-1] > radius:
