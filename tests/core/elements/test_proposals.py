@@ -164,6 +164,54 @@ def test_that_two_spheres_in_one_place_are_told_by_their_radii(rng):
     assert_array_equal(np.sort(np.concatenate([p.ellipses for p in found])), np.arange(58))
 
 
+@pytest.mark.parametrize(
+    ("n", "shift", "n_found"), [(7, 0, 0), (8, 0, 1), (8, 0.055, 1), (8, 0.065, 0)]
+)
+def test_that_a_sphere_has_eight_slices_whose_normals_meet(rng, n, shift, n_found):
+    direction, radius = random_direction(rng), 0.4
+    e = slices(np.zeros(3), radius, direction, np.resize([-0.3, 0.3], n) + 0.01 * np.arange(n))
+    meeting = e.meeting_point.copy()
+    # Half of them beside the others, as a share of the radius.
+    meeting[::2] += shift * radius * random_direction(rng)
+    assert len(find_spheres(replace(e, meeting_point=meeting))) == n_found
+
+
+@pytest.mark.parametrize(("off", "belongs"), [(0.0, True), (0.055, True), (0.065, False)])
+def test_that_a_centre_off_the_axis_by_six_percent_is_of_another_piece(rng, off, belongs):
+    axis = straight(rng)
+    up, _ = axis.frame(0.0)
+    e = along(axis, RADIUS, sd=1e-7)
+    e.centre[25] += off * RADIUS * up
+    (line,) = proposals_of(e)
+    assert (25 in line.ellipses) == belongs
+    assert len(line.ellipses) == 49 + belongs
+
+
+@pytest.mark.parametrize(("change", "belongs"), [(0.02, True), (0.03, False)])
+def test_that_a_radius_off_by_two_and_a_half_percent_is_of_another_piece(rng, change, belongs):
+    e = along(straight(rng), RADIUS, sd=1e-7)
+    e.radius[25] *= 1 + change
+    (line,) = proposals_of(e)
+    assert (25 in line.ellipses) == belongs
+    assert len(line.ellipses) == 49 + belongs
+
+
+@pytest.mark.parametrize(("length", "n_found"), [(0.45, 0), (0.55, 1)])
+def test_that_a_straight_is_half_a_radius_long_at_least(rng, length, n_found):
+    # From the first centre to the last one.
+    e = along(straight(rng, 4.9 * WIDTH), 4 * WIDTH / length, rng=rng)
+    assert len(e) == MIN_ELLIPSES
+    assert len(proposals_of(e)) == n_found
+
+
+@pytest.mark.parametrize(("slope", "is_tapered"), [(0.045, True), (0.035, False)])
+def test_that_a_reducer_tapers_by_four_percent_at_least(rng, slope, is_tapered):
+    axis = straight(rng, 0.5)
+    s = np.arange(0.0, axis.length, WIDTH)
+    found = proposals_of(along(axis, 0.1 - slope * s, sd=1e-7))
+    assert any(p.model.is_tapered for p in found) == is_tapered
+
+
 def test_that_proposals_turn_with_the_ellipses(rng):
     q = random_rotation(rng)
     bend = ArcAxis(np.zeros(3), q[2], q[0], 0.3, np.pi / 2)

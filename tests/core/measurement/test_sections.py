@@ -164,18 +164,19 @@ def test_that_wide_arcs_have_an_ovality(rng, pipe):
     assert np.isfinite(profiles.ovality).all()
 
 
-def test_that_slivers_thin_profiles_and_points_beyond_the_ends_make_none(rng, pipe):
+def test_that_slivers_and_points_beyond_the_ends_make_none(rng, pipe):
     assert len(cut(pipe, seen(rng, pipe, np.radians(30), noise=0.0))) == 0
     assert len(cut(pipe, (np.empty(0), np.empty(0), np.empty(0)))) == 0
     chainage, rho, clock = seen(rng, pipe)
     beyond = chainage + 1.0, rho, clock
     assert len(cut(pipe, beyond)) == 0
-    # Seven points in one profile, all others in the rest.
-    third = np.flatnonzero(chainage // WIDTH == 3)
-    left_out = np.ones(len(chainage), np.bool_)
-    left_out[third[7:]] = False
-    profiles = cut(pipe, (chainage[left_out], rho[left_out], clock[left_out]))
-    assert_array_equal(profiles.profile_index, np.setdiff1d(np.arange(50), [3]))
+
+
+@pytest.mark.parametrize(("n", "is_enough"), [(7, False), (8, True)])
+def test_that_a_profile_has_eight_points_at_least(pipe, n, is_enough):
+    """Both cover more than 40°: neighbours lie 0.19 rad apart, gaps count from 0.2 rad."""
+    places = np.full(n, 0.01), np.full(n, RADIUS), 0.19 * np.arange(n)
+    assert len(cut(pipe, places)) == is_enough
 
 
 def test_that_the_order_of_the_points_and_the_attitude_are_no_matter(rng, pipe):
