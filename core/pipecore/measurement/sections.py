@@ -158,14 +158,14 @@ def tabulate_ellipses(elements: tuple[Element, ...], ellipses: Ellipses) -> Prof
         chainage, rho, _ = axis.pipe_coordinates(ellipses.centre[near])
         expected = element.radius_at(np.clip(chainage, 0.0, axis.length))
         along = np.abs(np.einsum("ij,ij->i", axis.tangent(chainage), ellipses.axis[near]))
-        own = (
+        is_on = (
             (chainage >= 0)
             & (chainage <= axis.length)
             & (rho < 0.25 * expected + slack[near])
             & (np.abs(ellipses.radius[near] - expected) < 0.25 * expected + slack[near])
             & (along > np.cos(np.deg2rad(20.0)))
         )
-        rows, at, rho, expected = near[own], chainage[own], rho[own], expected[own]
+        rows, at, rho, expected = near[is_on], chainage[is_on], rho[is_on], expected[is_on]
         free[rows] = False
         e = ellipses[rows]
         table = Profiles(

@@ -79,9 +79,9 @@ def choose_stacks(
         named += [(f"auto {i}", d, width) for i, d in enumerate(found, start=1)]
     else:
         named += [(describe_direction(d), d, width) for d in preset_directions(settings.preset)]
-    for x, y, z, *own_width in settings.directions:
-        own = own_width[0] / 1e3 if own_width and own_width[0] else width
-        named.append((describe_direction((x, y, z)), (x, y, z), own))
+    for x, y, z, *given_width in settings.directions:
+        user_width = given_width[0] / 1e3 if given_width and given_width[0] else width
+        named.append((describe_direction((x, y, z)), (x, y, z), user_width))
     if not named:
         raise SettingsError(
             "There are no stacks to cut; choose directions other than “none” or give your own."

@@ -112,8 +112,8 @@ def find_planes(parts: Sequence[CellSums], voxel: float, max_radius: float) -> l
     sums = np.zeros((len(keys), kernels.N_SUMS), np.int64)
     np.add.at(sums, place, np.concatenate([part.sums for part in parts]))
     plane, is_cut = _planes_of_cells(keys, cells, sums, frame, max_radius / edge)
-    own_cells = np.split(place, np.cumsum(n_cells)[:-1])
-    return [CellPlanes(plane[own], is_cut[own]) for own in own_cells]
+    cells_of_part = np.split(place, np.cumsum(n_cells)[:-1])
+    return [CellPlanes(plane[rows], is_cut[rows]) for rows in cells_of_part]
 
 
 def _planes_of_cells(
@@ -186,6 +186,6 @@ def planes_of_points(
 
     for_chunks(add, n_parts, 1, "directions", progress, (0.8, 1.0))
     known = find_planes([part for part in parts if part], voxel, max_radius)
-    for own, cells in zip(rows, known, strict=True):
-        is_cut[own], plane[own] = cells.is_cut[plane[own]], cells.plane[plane[own]]
+    for part, cells in zip(rows, known, strict=True):
+        is_cut[part], plane[part] = cells.is_cut[plane[part]], cells.plane[plane[part]]
     return plane, is_cut

@@ -62,8 +62,8 @@ def sort_into_cells(
 
     def sort(first: int, last: int) -> None:
         for k in range(first, last):
-            own = slice(bounds[k], bounds[k + 1])
-            kernels.sort_bucket(xyz, frame.numbers, order[own], is_first[own])
+            bucket = slice(bounds[k], bounds[k + 1])
+            kernels.sort_bucket(xyz, frame.numbers, order[bucket], is_first[bucket])
 
     for_chunks(sort, len(bounds) - 1, 8, stage, progress, (middle, end))
     return order, np.append(np.flatnonzero(is_first), n).astype(order.dtype)

@@ -104,8 +104,8 @@ def _batches(
     profiles = np.unique(np.concatenate([p for p, _ in sorted_slabs]))
     # How many points each slab has in each of the profiles.
     counts = np.zeros((len(sorted_slabs), len(profiles)), np.int64)
-    for k, (own, n) in enumerate(sorted_slabs):
-        counts[k, np.searchsorted(profiles, own)] = n
+    for k, (of_slab, n) in enumerate(sorted_slabs):
+        counts[k, np.searchsorted(profiles, of_slab)] = n
     upto = np.concatenate([np.zeros((len(counts), 1), np.int64), counts.cumsum(axis=1)], axis=1)
     total = upto.sum(axis=0)
     batches, first = [], 0
@@ -161,7 +161,7 @@ def ellipses_of_batch(
 
     def of_all(name: str) -> NDArray[Any]:
         # In each profile in the order of the whole surface, since the slabs are.
-        return np.concatenate([store.open(f"{name}-{k}")[own] for k, own in enumerate(chosen)])
+        return np.concatenate([store.open(f"{name}-{k}")[rows] for k, rows in enumerate(chosen)])
 
     index = of_all("cut")
     xyz, normals, spacing = (of_all(f"cut-{name}") for name in CUT_ARRAYS)

@@ -282,10 +282,10 @@ def downsample_slab(
     return planes, counts
 
 
-def fit_slab_planes(store: Store, own: Rows, near: Rows, edge: float) -> None:
+def fit_slab_planes(store: Store, rows: Rows, near: Rows, edge: float) -> None:
     """Fit planes to a slab's downsampled points, with those of the margin around it."""
     xyz = np.array(store.open("surface")[slice(*near)])
     fitted = fit_planes(xyz, edge, StopWhenUnwanted(store))
-    inside = slice(own[0] - near[0], own[1] - near[0])
+    inside = slice(rows[0] - near[0], rows[1] - near[0])
     for name, values in zip(("normals", "residuals", "spacing"), fitted, strict=True):
-        store.open(name)[slice(*own)] = values[inside]
+        store.open(name)[slice(*rows)] = values[inside]
