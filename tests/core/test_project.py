@@ -1,4 +1,4 @@
-"""What is installed: the lock carries what the project asks for, the wheel all that it runs on."""
+"""What is installed: the lock carries what is asked for, the wheels bring all that they run on."""
 
 import re
 import subprocess
@@ -12,7 +12,11 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+APP, CORE = (
+    tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for folder in (ROOT, ROOT / "core")
+)
+OWN = {APP["name"], CORE["name"]}
 LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
 
 
@@ -34,9 +38,15 @@ def test_that_the_lock_names_no_address_and_no_folder() -> None:
 
 
 def asked() -> list[Requirement]:
-    """What the project asks for on this Python."""
-    texts = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["dev"]]
-    return [r for r in map(Requirement, texts) if r.marker is None or r.marker.evaluate()]
+    """What both distributions ask for on this Python, with all extras; not each other."""
+    texts = [
+        text
+        for project in (APP, CORE)
+        for group in (project["dependencies"], *project["optional-dependencies"].values())
+        for text in group
+    ]
+    wanted = [r for r in map(Requirement, texts) if r.marker is None or r.marker.evaluate()]
+    return [r for r in wanted if r.name not in OWN]
 
 
 @pytest.mark.parametrize("wanted", asked(), ids=lambda r: r.name)
@@ -51,16 +61,21 @@ def test_that_the_lock_has_what_the_project_asks_for(wanted: Requirement) -> Non
     assert wanted.specifier.contains(versions[0])
 
 
-def test_that_the_wheel_brings_its_resources(tmp_path: Path) -> None:
+def build_wheel(folder: Path, target: Path) -> None:
+    """Build the wheel of a distribution and unpack it."""
     subprocess.run(
-        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
-        cwd=ROOT,
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(target)],
+        cwd=folder,
         check=True,
         capture_output=True,
     )
-    (wheel,) = tmp_path.glob("*.whl")
+    (wheel,) = target.glob("*.whl")
+    zipfile.ZipFile(wheel).extractall(target / "unpacked")
+
+
+def test_that_the_wheel_of_the_library_brings_its_resources(tmp_path: Path) -> None:
+    build_wheel(ROOT / "core", tmp_path)
     unpacked = tmp_path / "unpacked"
-    zipfile.ZipFile(wheel).extractall(unpacked)
     ask = (
         f"import sys; sys.path.insert(0, {str(unpacked)!r})\n"
         "from pipecore.resources import resource; print(resource('sizes'))"
@@ -71,5 +86,12 @@ def test_that_the_wheel_brings_its_resources(tmp_path: Path) -> None:
     assert Path(sizes).is_relative_to(unpacked)
     in_sources = {p.name for p in (ROOT / "resources" / "sizes").iterdir()}
     assert {p.name for p in Path(sizes).iterdir()} == in_sources
-    assert (unpacked / "pipegui" / "document.py").is_file()
     assert (unpacked / "pipecore" / "py.typed").is_file()
+    assert not (unpacked / "pipegui").exists()
+
+
+def test_that_the_wheel_of_the_app_holds_the_app_alone(tmp_path: Path) -> None:
+    build_wheel(ROOT, tmp_path)
+    unpacked = tmp_path / "unpacked"
+    assert (unpacked / "pipegui" / "window" / "main_window.py").is_file()
+    assert not (unpacked / "pipecore").exists()
