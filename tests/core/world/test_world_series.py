@@ -17,7 +17,9 @@ def test_that_each_line_of_the_table_of_damage_is_seen(rng, name):
         offset = drawn.truth.elements[0].axis.pipe_coordinates(drawn.cloud.xyz.astype(float))[1]
         radius = drawn.truth.elements[0].radius
         if "dent" in expected.kinds and "sphere" not in name:
-            assert radius - offset.min() == pytest.approx(expected.size, rel=0.15)
+            # Points 50 mm apart may all miss the bottom of a dent of 160 mm by 35 mm.
+            least = 0.6 if "50 mm" in name else 0.85
+            assert least * expected.size < radius - offset.min() < 1.001 * expected.size
 
 
 def test_that_a_round_pipe_is_right_in_the_table():
