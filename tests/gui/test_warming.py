@@ -76,7 +76,7 @@ def test_that_the_window_is_there_before_what_only_a_detection_needs():
     heavy = ("matplotlib", "numba", "open3d", "scipy.spatial", "scipy.ndimage", "laspy")
     program = (
         "import sys, pipegui.composition, pipegui.scene.view, pipegui.plots.section_view\n"
-        "import pipegui.plots.radius_plot, pipegui.plots.deviation_map\n"
+        "import pipegui.plots.radius_plot, pipegui.plots.deviation_map_view\n"
         "import pipegui.plots.preview_view\n"
         f"print([name for name in {heavy} if name in sys.modules])"
     )
