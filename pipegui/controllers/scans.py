@@ -9,6 +9,7 @@ from pipecore.resources import resource
 from pipecore.types import PointCloud, Result
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.session import Session
+from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import tr
 from pipegui.model import commands
 from pipegui.model.document import Scan
@@ -46,9 +47,12 @@ class Scans(QObject):
         self._session.jobs.open_files(scans, self._session.document.settings)
 
     def on_scan_read(self, scan: Scan) -> None:
-        """Add a scan that was read."""
+        """Add a scan that was read; what was left out or guessed of it is said."""
         self._session.hide_message()
         self._session.do(commands.open_scan, scan)
+        if scan.cloud.notes:
+            notes = " ".join(reason_text(note) for note in scan.cloud.notes)
+            self._session.show_message(f"{scan.name}: {notes}", "warning")
         if scan.cloud.source is not None:
             file_dialogs.remember(self._session.stored, scan.cloud.source)
             self.recent_files_changed.emit()

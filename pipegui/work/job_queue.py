@@ -42,8 +42,15 @@ def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointClo
     """Read a scan with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
+    given = settings.input
     return read(
-        path, length_unit=settings.input.length_unit, progress=progress, look=progress.show_part
+        path,
+        length_unit=given.length_unit,
+        flagged_points=given.flagged_points,
+        stations=given.stations,
+        columns=given.columns,
+        progress=progress,
+        look=progress.show_part,
     )
 
 

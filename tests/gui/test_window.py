@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent, QImage
 from PySide6.QtWidgets import QApplication, QDialog, QDoubleSpinBox, QFileDialog, QPushButton
 
 from pipecore.errors import CancelledError, ReadError
+from pipecore.notes import Note
 from pipecore.types import NO_ID
 from pipegui.model import selection_commands
 from pipegui.model.document import Background, ColourBy, ProfileKey, Selection, Tool
@@ -106,6 +108,14 @@ def test_that_a_dropped_file_is_opened(app, qtbot, tmp_path):
     QApplication.sendEvent(app.window, drop)
     qtbot.waitUntil(lambda: app.session.document.scan is not None and not app.session.jobs.is_busy)
     assert app.session.document.scan.name == "a.laz"
+
+
+def test_that_what_reading_left_out_or_guessed_is_said(make_app, qtbot, german):
+    note = Note("“{name}”: {count} points left out.", name="a.laz", count=148)
+    app = make_app(read=lambda *_: replace(make_cloud(), notes=(note,)))
+    app.controllers.scans.open_files([Path("a.laz")])
+    qtbot.waitUntil(app.window.panels.message.isVisible)
+    assert "148" in app.window.panels.message.text.text()
 
 
 def test_that_several_files_become_several_scans_of_which_the_tree_chooses(app, qtbot):

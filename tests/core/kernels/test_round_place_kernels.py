@@ -55,6 +55,7 @@ def test_that_flat_and_unknown_and_few_points_tell_no_axis(rng):
     assert np.isnan(axis_of(sums_of(xyz[:8], normals[:8]))).all()
 
 
+@pytest.mark.filterwarnings("ignore:overflow encountered")  # of the hash, where it is plain Python
 def test_that_the_axis_around_a_cell_is_that_of_it_and_its_neighbours(rng):
     cells = np.array([[5, 5, 5], [5, 5, 6], [6, 5, 5], [9, 9, 9]])
     keys = (cells[:, 0] * 20 + cells[:, 1]) * 20 + cells[:, 2]
