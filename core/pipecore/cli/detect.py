@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from pipecore import io, parallel
+from pipecore._kernels import local_surfaces
 from pipecore._kernels.local_surfaces import fit_planes
 from pipecore.cli.console import Console
 from pipecore.cli.parser import given_settings
@@ -53,7 +54,8 @@ def run(args: argparse.Namespace, console: Console) -> None:
 def is_compiled() -> bool:
     """Return whether numba's cache holds compiled kernels."""
     stats = getattr(fit_planes, "stats", None)  # none where compiling is switched off
-    return stats is None or any(Path(stats.cache_path).glob("neighbours.fit_planes-*.nbi"))
+    cached = f"{Path(local_surfaces.__file__).stem}.fit_planes-*.nbi"
+    return stats is None or any(Path(stats.cache_path).glob(cached))
 
 
 @contextmanager

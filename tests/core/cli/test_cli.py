@@ -293,7 +293,7 @@ def test_that_only_a_first_detection_says_that_it_compiles(
     store = tmp_path / "store"
     store.mkdir()
     if not is_first:
-        (store / "neighbours.fit_planes-12.py311.nbi").touch()
+        (store / "local_surfaces.fit_planes-12.py311.nbi").touch()
     kernel = SimpleNamespace(stats=SimpleNamespace(cache_path=str(store)))
     monkeypatch.setattr("pipecore.cli.detect.fit_planes", kernel)
     assert run("detect", scan_file, "-o", tmp_path / "report") == 0
