@@ -22,7 +22,6 @@ from tools.world.tubes import Line, dome, tube
 Rng = np.random.Generator
 X, Y, Z = np.eye(3)
 FLAT = np.eye(3)
-UPRIGHT = np.column_stack([X, Z, -Y])
 """Takes z, along which outlines are swept and heights are counted, to -y."""
 LYING = np.column_stack([Y, Z, X])
 """Takes z to x: what is swept along z lies on the floor."""
