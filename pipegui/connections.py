@@ -161,6 +161,9 @@ def connect_panels(window: MainWindow, session: Session, controllers: Controller
         lambda kind, position: show_context_menu(window, window.actions_, kind, position)
     )
     panels.tree.visibility_changed.connect(lambda ids, hide: do(commands.set_hidden, ids, hide))
+    panels.tree.stations_hidden.connect(
+        lambda ids, hide: do(commands.set_stations_hidden, ids, hide)
+    )
     panels.table.chosen.connect(lambda i: do(selection_commands.select_deformation, i))
     panels.table.reviewed.connect(lambda ids, state: do(commands.set_review, ids, state))
     panels.table.commented.connect(lambda i, text: do(commands.set_comment, i, text))
@@ -198,6 +201,7 @@ def connect_views(window: MainWindow, session: Session, controllers: Controllers
     views.scene.measurement_closed.connect(lambda i: do(view_commands.delete_measurement, i))
     views.scene.deformation_picked.connect(lambda i: do(selection_commands.select_deformation, i))
     views.scene.hovered.connect(hovering.hover_point)
+    views.scene.station_hovered.connect(hovering.hover_station)
     views.radius_plot.profile_clicked.connect(
         lambda s, i: do(selection_commands.select_profile, s, i)
     )

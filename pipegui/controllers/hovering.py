@@ -5,6 +5,7 @@ from PySide6.QtCore import QObject, Signal
 from pipegui.controllers.session import Session
 from pipegui.model import result_queries
 from pipegui.model.document import ProfileKey
+from pipegui.model.stations import stations_of
 from pipegui.states import descriptions
 
 
@@ -41,6 +42,16 @@ class Hovering(QObject):
             element_id = document.selection.element_id
             place = result_queries.spot_of_point(scan.cloud, scan.result, element_id, point_index)
         self.place_changed.emit(place)
+
+    def hover_station(self, station_id: int) -> None:
+        """Describe the station whose mark is under the cursor."""
+        scan = self._session.document.scan
+        if scan is None:
+            return
+        self.coordinates_changed.emit("")
+        for station in stations_of(scan.cloud):
+            if station.station_id == station_id:
+                self.description_changed.emit(descriptions.station_text(station, scan.cloud))
 
     def hover_spot(self, place: tuple[float, float] | None) -> None:
         """Mark a spot of the selected element's surface: chainage in metres, clock angle."""

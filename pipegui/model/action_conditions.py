@@ -33,7 +33,7 @@ def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool
         "stack": view.colour_by is ColourBy.PROFILE and bool(view.shown_stack),
         "box": view.clip_box is not None,
         "measured": bool(view.measurements),
-        "hidden": bool(view.hidden_elements),
+        "hidden": bool(view.hidden_elements or view.hidden_stations),
         "busy": is_busy,
         "idle": not is_busy,
     }

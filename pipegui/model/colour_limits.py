@@ -18,6 +18,12 @@ def intensity_range(cloud: PointCloud) -> Limits:
     return float(low), float(high)
 
 
+def has_contrast(cloud: PointCloud) -> bool:
+    """Return whether intensities differ: some files have the same one for all points."""
+    low, high = intensity_range(cloud)
+    return low < high
+
+
 @cached_with_owner(maxsize=4)
 def height_range(cloud: PointCloud) -> Limits:
     """Return the local heights between which nearly all points lie."""

@@ -12,6 +12,7 @@ from pipecore.settings import DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
 from pipegui.i18n.texts import mark
 from pipegui.model import presets
+from pipegui.model.colour_limits import has_contrast
 from pipegui.model.document import (
     ColourBy,
     Document,
@@ -28,6 +29,7 @@ from pipegui.model.selection import (
     worst_deformation,
 )
 from pipegui.model.selection_commands import select_parent
+from pipegui.model.stations import has_stations
 
 Command = TypeVar("Command", bound=Callable[..., Document])
 
@@ -82,6 +84,7 @@ def activate_scan(document: Document, index: int) -> Document:
     view = replace(
         document.view,
         hidden_elements=frozenset(),
+        hidden_stations=frozenset(),
         shown_stack=NO_ID,
         shown_profile=None,
         pinned_elements=(),
@@ -167,8 +170,9 @@ def colours_of(scan: Scan) -> tuple[ColourBy, ...]:
     """Return what a scan's points can be coloured by, the most useful first."""
     has = {
         ColourBy.RGB: scan.cloud.rgb is not None,
-        ColourBy.INTENSITY: scan.cloud.intensity is not None,
+        ColourBy.INTENSITY: scan.cloud.intensity is not None and has_contrast(scan.cloud),
         ColourBy.HEIGHT: True,
+        ColourBy.STATION: has_stations(scan.cloud),
     } | dict.fromkeys(
         (
             ColourBy.DEVIATION,
@@ -298,6 +302,13 @@ def set_hidden(document: Document, element_ids: Iterable[int], hidden: bool) -> 
     return set_view(document, hidden_elements=before | ids if hidden else before - ids)
 
 
+@step(mark("Show or hide"))
+def set_stations_hidden(document: Document, station_ids: Iterable[int], hidden: bool) -> Document:
+    """Hide the points of stations, or show them again."""
+    before, ids = document.view.hidden_stations, frozenset(station_ids)
+    return set_view(document, hidden_stations=before | ids if hidden else before - ids)
+
+
 @step(mark("Isolate"))
 def isolate(document: Document) -> Document:
     """Hide all elements but those of the selection."""
@@ -311,8 +322,8 @@ def isolate(document: Document) -> Document:
 
 @step(mark("Show all"))
 def show_all(document: Document) -> Document:
-    """Show all hidden elements again."""
-    return set_view(document, hidden_elements=frozenset())
+    """Show all hidden elements and stations again."""
+    return set_view(document, hidden_elements=frozenset(), hidden_stations=frozenset())
 
 
 def after_undo(present: Document, target: Document) -> Document:
@@ -321,7 +332,11 @@ def after_undo(present: Document, target: Document) -> Document:
         return target
     if present.scan.cloud is not target.scan.cloud:
         return target
-    view: ViewOptions = replace(present.view, hidden_elements=target.view.hidden_elements)
+    view: ViewOptions = replace(
+        present.view,
+        hidden_elements=target.view.hidden_elements,
+        hidden_stations=target.view.hidden_stations,
+    )
     if view.colour_by not in colours_of(target.scan):
         view = replace(view, colour_by=target.view.colour_by, shown_stack=NO_ID)
     selection = carry_over_selection(present.selection, present.result, target.result)

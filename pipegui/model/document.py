@@ -29,6 +29,7 @@ class ColourBy(Choice):
     RGB = "RGB"
     PROFILE = "Profiles of a stack"
     VERDICT = "Verdict"
+    STATION = "Station"
 
 
 class Background(Choice):
@@ -127,11 +128,14 @@ class ViewOptions:
     colour_by: ColourBy = ColourBy.RGB
     deviation_limit_mm: float = 10.0
     hidden_elements: frozenset[int] = frozenset()
+    hidden_stations: frozenset[int] = frozenset()
     show_points: bool = True
     show_axes: bool = True
     show_ellipses: bool = False
     show_surfaces: bool = False
     show_labels: bool = True
+    show_stations: bool = True
+    """Whether it is marked where the scanner stood."""
     shown_stack: int = NO_ID
     """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
     plot_stack: int = OWN_STACK

@@ -17,12 +17,15 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QFont, QIcon
 
 from pipecore.report.summary import by_verdict
-from pipecore.types import NO_ID, Deformation, Element, Result
+from pipecore.types import NO_ID, Deformation, Element, PointCloud, Result
 from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.model.document import Scan, Selection
+from pipegui.model.stations import stations_of
 from pipegui.states import descriptions
+from pipegui.states.descriptions import station_label
 from pipegui.states.view_state import TreeState
 from pipegui.style import theme
+from pipegui.style.colour_maps import station_colour
 
 Index = QModelIndex | QPersistentModelIndex
 Role = Qt.ItemDataRole
@@ -39,6 +42,8 @@ class NodeKind(Enum):
     ELEMENT = "element"
     DEFORMATIONS = "deformations"
     DEFORMATION = "deformation"
+    STATIONS = "stations"
+    STATION = "station"
 
 
 @dataclass(eq=False)
@@ -58,6 +63,8 @@ class _Node:
     """Its deformations, the worst first."""
     elements: tuple[int, ...] = ()
     """Ids of the elements whose visibility the check box of this node sets."""
+    stations: tuple[int, ...] = ()
+    """Ids of the stations whose visibility it sets."""
     number: int = 0
     row: int = 0
     children: "list[_Node]" = field(default_factory=list)
@@ -68,6 +75,8 @@ class ProjectModel(QAbstractItemModel):
 
     visibility_changed = Signal(object, bool)
     """Ids of elements, and whether they are to be hidden."""
+    stations_hidden = Signal(object, bool)
+    """Ids of stations, and whether they are to be hidden."""
     renamed = Signal(int, object, int, str)
     """Scan, kind and id of a node, and what it is to be called."""
 
@@ -88,7 +97,7 @@ class ProjectModel(QAbstractItemModel):
                 self._add_scan(index, scan)
             self.endResetModel()
             return True
-        if (state.hidden_elements, state.active) != (before.hidden_elements, before.active):
+        if _checks_of(state) != _checks_of(before):
             self._tell_checks(QModelIndex())
         return False
 
@@ -116,8 +125,11 @@ class ProjectModel(QAbstractItemModel):
         node.icon = "scatter-plot-outline"
         node.hint = f"{hint}\n{descriptions.point_count(len(scan.cloud))}"
         self._add(node)
-        if result is None:
-            return
+        if result is not None:
+            self._add_result(node, index, result)
+        self._add_stations(node, index, scan.cloud)
+
+    def _add_result(self, node: _Node, index: int, result: Result) -> None:
         node.elements = tuple(e.element_id for e in result.elements)
         ranked = by_verdict(result)
         for run_id in sorted({e.run_id for e in result.elements}):
@@ -128,6 +140,22 @@ class ProjectModel(QAbstractItemModel):
             self._add(branch)
             for deformation in ranked:
                 self._add_deformation(branch, deformation, result)
+
+    def _add_stations(self, parent: _Node, index: int, cloud: PointCloud) -> None:
+        stations = stations_of(cloud)
+        if cloud.station is None or not stations:
+            return
+        branch = _Node(NodeKind.STATIONS, parent, index)
+        branch.text = tr("Stations ({n})").format(n=len(stations))
+        branch.icon = "map-marker-radius-outline"
+        branch.stations = tuple(station.station_id for station in stations)
+        self._add(branch)
+        for station in stations:
+            node = _Node(NodeKind.STATION, branch, index, station.station_id)
+            label, points = station_label(station), descriptions.point_count(station.n_points)
+            node.text, node.stations = f"{label} · {points}", (station.station_id,)
+            node.hint = descriptions.station_text(station, cloud)
+            self._add(node)
 
     def _add_run(
         self, parent: _Node, run_id: int, result: Result, ranked: list[Deformation]
@@ -207,7 +235,7 @@ class ProjectModel(QAbstractItemModel):
         flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
         node = self.node(index)
         is_active = node.scan_index == self._state.active
-        if index.column() == NAME and node.elements and is_active:
+        if index.column() == NAME and (node.elements or node.stations) and is_active:
             flags |= Qt.ItemFlag.ItemIsUserCheckable
         is_named = node.kind is NodeKind.SCAN or (
             node.kind in (NodeKind.RUN, NodeKind.ELEMENT) and is_active
@@ -248,6 +276,8 @@ class ProjectModel(QAbstractItemModel):
             return None
         if node.kind is NodeKind.DEFORMATION:
             return theme.verdict_icon(node.badge[0].verdict)
+        if node.kind is NodeKind.STATION:
+            return theme.swatch_icon(station_colour(node.item_id))
         return theme.icon(node.icon, "muted")
 
     def _hint(self, node: _Node, column: int) -> str:
@@ -256,12 +286,15 @@ class ProjectModel(QAbstractItemModel):
         return node.hint or node.text
 
     def _check_state(self, node: _Node) -> Qt.CheckState | None:
-        if not node.elements or node.scan_index != self._state.active:
+        ids, hidden = node.elements, self._state.hidden_elements
+        if node.stations:
+            ids, hidden = node.stations, self._state.hidden_stations
+        if not ids or node.scan_index != self._state.active:
             return None
-        n_hidden = len(self._state.hidden_elements.intersection(node.elements))
+        n_hidden = len(hidden.intersection(ids))
         if n_hidden == 0:
             return Qt.CheckState.Checked
-        all_hidden = n_hidden == len(node.elements)
+        all_hidden = n_hidden == len(ids)
         return Qt.CheckState.Unchecked if all_hidden else Qt.CheckState.PartiallyChecked
 
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802
@@ -275,7 +308,11 @@ class ProjectModel(QAbstractItemModel):
         if role != Role.CheckStateRole or not self.flags(index) & Qt.ItemFlag.ItemIsUserCheckable:
             return False
         hide = Qt.CheckState(value) == Qt.CheckState.Unchecked
-        self.visibility_changed.emit(self.node(index).elements, hide)
+        node = self.node(index)
+        if node.stations:
+            self.stations_hidden.emit(node.stations, hide)
+        else:
+            self.visibility_changed.emit(node.elements, hide)
         return True
 
     # For the panel
@@ -313,9 +350,18 @@ class ProjectModel(QAbstractItemModel):
 
     def spanned(self) -> list[QModelIndex]:
         """Return the nodes whose name may take the whole width."""
-        kinds = (NodeKind.DEFORMATIONS, NodeKind.DEFORMATION)
+        kinds = (
+            NodeKind.DEFORMATIONS,
+            NodeKind.DEFORMATION,
+            NodeKind.STATIONS,
+            NodeKind.STATION,
+        )
         nodes = [node for node in self.nodes if node.kind in kinds]
         return [self.createIndex(node.row, NAME, node.number) for node in nodes]
+
+
+def _checks_of(state: TreeState) -> tuple[Any, ...]:
+    return state.hidden_elements, state.hidden_stations, state.active
 
 
 def _shown_of(scans: tuple[Scan, ...]) -> list[tuple[Any, ...]]:

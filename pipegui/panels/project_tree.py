@@ -43,12 +43,16 @@ class ProjectTree(QWidget):
     visibility_changed = Signal(object, bool)
     """Ids of elements, and whether they are to be hidden."""
 
+    stations_hidden = Signal(object, bool)
+    """Ids of stations, and whether they are to be hidden."""
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._state = TreeState()
         self._applying = Applying()
         self.model = ProjectModel(self)
         self.model.visibility_changed.connect(self.visibility_changed)
+        self.model.stations_hidden.connect(self.stations_hidden)
         self.model.renamed.connect(self.renamed)
         self.view = QTreeView()
         self.view.setAccessibleName(tr("Project"))

@@ -10,6 +10,7 @@ from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stac
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.colour_limits import height_limits, intensity_limits
 from pipegui.model.document import Box, ColourBy, ViewOptions
+from pipegui.model.stations import has_stations
 from pipegui.scene.colour_assignment import colour_apart, neighbouring_ids
 from pipegui.style.colour_maps import (
     BLOCK,
@@ -21,6 +22,7 @@ from pipegui.style.colour_maps import (
     deviation_colours,
     look_up,
     rgb,
+    station_colour,
 )
 from pipegui.style.colours import VERDICT
 
@@ -51,6 +53,8 @@ def effective(colour_by: ColourBy, cloud: PointCloud, result: Result | None) -> 
     """Return `colour_by`, or the next best that this cloud and result can show."""
     if result is None and colour_by in NEEDS_RESULT:
         colour_by = ColourBy.RGB
+    if colour_by is ColourBy.STATION and not has_stations(cloud):
+        colour_by = ColourBy.RGB
     if colour_by is ColourBy.RGB and cloud.rgb is None:
         colour_by = ColourBy.INTENSITY
     if colour_by is ColourBy.INTENSITY and cloud.intensity is None:
@@ -73,6 +77,8 @@ def colour_points(
         return cloud.rgb[rows]
     if colour_by is ColourBy.INTENSITY and cloud.intensity is not None:
         return _by_intensity(asked, cloud.intensity)
+    if colour_by is ColourBy.STATION and cloud.station is not None:
+        return _by_station(asked, cloud.station)
     if result is None or colour_by not in _BY_RESULT:
         return _by_height(asked)
     return _BY_RESULT[colour_by](asked, result)
@@ -84,10 +90,11 @@ def visible_points(
     hidden: frozenset[int],
     box: Box | None = None,
     rows: Rows = ALL,
+    hidden_stations: frozenset[int] = frozenset(),
 ) -> NDArray[np.bool_] | None:
-    """Return which points are shown by the box and not of hidden elements, None if all are.
+    """Return which points are shown by the box and not of what is hidden, None if all are.
 
-    Of the `rows` of the cloud, by default of all.
+    Of the `rows` of the cloud, by default of all; `hidden` are elements.
     """
     seen = None if box is None else points_in(box, cloud.xyz[rows])
     if result is not None and hidden:
@@ -95,7 +102,17 @@ def visible_points(
         shown[[i for i in hidden if i < len(shown)]] = False
         is_shown = shown[result.element_id[rows]]
         seen = is_shown if seen is None else seen & is_shown
+    if cloud.station is not None and hidden_stations:
+        is_shown = _shown_stations(cloud, hidden_stations)[cloud.station[rows]]
+        seen = is_shown if seen is None else seen & is_shown
     return seen
+
+
+def _shown_stations(cloud: PointCloud, hidden: frozenset[int]) -> NDArray[np.bool_]:
+    """Return whether a station is shown, by its id."""
+    shown = np.ones(len(cloud.station_names) + 1, np.bool_)
+    shown[[i for i in hidden if i < len(shown)]] = False
+    return shown
 
 
 def points_in(box: Box, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
@@ -165,6 +182,12 @@ def _by_intensity(asked: _Asked, intensity: NDArray[np.floating]) -> Colours:
 def _by_height(asked: _Asked) -> Colours:
     share = _share(asked.cloud.xyz[asked.rows, 2], height_limits(asked.cloud, asked.view))
     return look_up(HEIGHT, share, asked.muted)
+
+
+def _by_station(asked: _Asked, station: NDArray[np.uint16]) -> Colours:
+    ids = range(1, len(asked.cloud.station_names) + 1)
+    table = np.array([asked.muted, *map(station_colour, ids)], np.uint8)
+    return _look_up_ids(table, station[asked.rows])
 
 
 def _by_deviation(asked: _Asked, result: Result) -> Colours:

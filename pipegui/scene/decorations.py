@@ -16,6 +16,7 @@ from pipegui.scene.colouring import (
     profile_rows,
     stack_of,
     visible_elements,
+    visible_points,
 )
 from pipegui.scene.point_layer import point_actor, set_planes
 from pipegui.states.view_state import SceneState
@@ -28,6 +29,8 @@ SURFACE_OPACITY = 0.5
 SURFACE_COLOUR = "#7d9cc4"
 ACCENT_POINTS = {ColourBy.SEGMENT, ColourBy.ELEMENT, ColourBy.KIND, ColourBy.RGB}
 """Colourings whose colours the selection may cover; others are measured values."""
+HIGHLIGHTING = ("colour_by", "show_points", "hidden_stations")
+"""View options that decide which points of the selection are drawn over the others."""
 
 
 class Decorations:
@@ -57,7 +60,7 @@ class Decorations:
         selected = base or state.selection != before.selection
         if selected or old.show_ellipses != new.show_ellipses:
             self._replace("ellipses", self._ellipses(state))
-        if selected or old.colour_by != new.colour_by or old.show_points != new.show_points:
+        if selected or any(getattr(old, name) != getattr(new, name) for name in HIGHLIGHTING):
             self._replace("highlight", self._highlight(state))
         is_other_stack = (old.shown_stack, old.shown_profile) != (
             new.shown_stack,
@@ -145,6 +148,10 @@ class Decorations:
         colour_by = effective(state.view.colour_by, cloud, result)
         if colour_by in ACCENT_POINTS and state.view.show_points:
             rows = np.flatnonzero(result.element_id == element.element_id)
+            seen = visible_points(
+                cloud, None, frozenset(), rows=rows, hidden_stations=state.view.hidden_stations
+            )
+            rows = rows if seen is None else rows[seen]
             for moving, limit in MAX_HIGHLIGHTED.items() if len(rows) else ():
                 thinned = rows[:: -(-len(rows) // limit)]
                 self._accented[moving] = _points(cloud.xyz[thinned], accent)

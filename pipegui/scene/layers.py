@@ -10,7 +10,7 @@ from PySide6.QtCore import QObject, QPointF
 from pipecore.types import PointCloud
 from pipegui.model.document import Box
 from pipegui.scene.canvas import Canvas
-from pipegui.scene.colouring import colour_points, visible_points
+from pipegui.scene.colouring import ALL, Rows, colour_points, visible_points
 from pipegui.scene.details import Finder, Mask, rows_in_picture, rows_of
 from pipegui.scene.picking import pick_point
 from pipegui.scene.point_layer import MOVING_LEVEL, PointLayer
@@ -78,6 +78,7 @@ class Layers(QObject):
             cloud is not before.cloud
             or hidden != before.view.hidden_elements
             or (hidden and is_new_result)
+            or view.hidden_stations != before.view.hidden_stations
             or view.clip_box != before.view.clip_box
         )
         if is_other_subset:
@@ -96,8 +97,7 @@ class Layers(QObject):
         """Show the points that are to be seen; of a large cloud, a part until all are known."""
         self._subset.stop()
         self._search = None
-        is_whole = box is None and not self._state.view.hidden_elements
-        if is_whole or len(cloud) <= AT_ONCE:
+        if self._is_whole(box) or len(cloud) <= AT_ONCE:
             self.whole.set_points(cloud, rows_of(self._visible(box)), self.colour_rows)
             return
         self.whole.set_points(cloud, self._sample(box), self.colour_rows)
@@ -164,18 +164,28 @@ class Layers(QObject):
         state = self._state
         if state.cloud is None:
             return None
-        return visible_points(state.cloud, state.result, state.view.hidden_elements, box)
+        return self._visible_rows(state.cloud, box)
+
+    def _visible_rows(self, cloud: PointCloud, box: Box | None, rows: Rows = ALL) -> Mask | None:
+        state, view = self._state, self._state.view
+        return visible_points(
+            cloud, state.result, view.hidden_elements, box, rows, view.hidden_stations
+        )
+
+    def _is_whole(self, box: Box | None) -> bool:
+        """Return whether no point is left out."""
+        view = self._state.view
+        return box is None and not view.hidden_elements and not view.hidden_stations
 
     def _sample(self, box: Box | None) -> NDArray[np.int32] | None:
         """Return the visible rows of a sample small enough to take no time; None: all are."""
         state = self._state
-        if state.cloud is None or (box is None and not state.view.hidden_elements):
+        if state.cloud is None or self._is_whole(box):
             return None
         if len(state.cloud) <= AT_ONCE:
             return rows_of(self._visible(box))
         rows = Spread(len(state.cloud)).rows(0, AT_ONCE)
-        hidden = state.view.hidden_elements
-        seen = visible_points(state.cloud, state.result, hidden, box, rows)
+        seen = self._visible_rows(state.cloud, box, rows)
         return (rows if seen is None else rows[seen]).astype(np.int32)
 
     def colour_rows(self, rows: NDArray[np.int32]) -> Colours:

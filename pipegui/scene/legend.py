@@ -9,6 +9,7 @@ from pipecore.types import ElementKind, PointCloud, Result
 from pipegui.i18n.texts import first_capital, mark, tr
 from pipegui.model.colour_limits import height_limits, intensity_limits, n_decimals
 from pipegui.model.document import ColourBy, Limits, ViewOptions
+from pipegui.model.stations import stations_of
 from pipegui.scene.colouring import (
     KIND_COLOUR,
     NO_ELEMENT,
@@ -17,8 +18,19 @@ from pipegui.scene.colouring import (
     effective,
     stack_of,
 )
-from pipegui.style.colour_maps import DEVIATION, HEIGHT, INTENSITY, Colours, rgb
+from pipegui.states.descriptions import point_count, station_label
+from pipegui.style.colour_maps import (
+    DEVIATION,
+    HEIGHT,
+    INTENSITY,
+    Colours,
+    rgb,
+    station_colour,
+)
 from pipegui.style.colours import VERDICT
+
+MOST_LISTED, LONGEST_NAME = 12, 28
+"""Stations, and characters of their names, that a legend has room for."""
 
 Swatch = tuple[tuple[int, int, int], str]
 
@@ -63,6 +75,8 @@ def make_legend(cloud: PointCloud, result: Result | None, view: ViewOptions) -> 
         return Legend(tr("Height, m"), HEIGHT, _ticks((low, high)))
     if colour_by is ColourBy.INTENSITY:
         return Legend(tr("Intensity"), INTENSITY, _ticks(intensity_limits(cloud, view)))
+    if colour_by is ColourBy.STATION:
+        return Legend(tr("Station"), swatches=_station_swatches(cloud))
     return _result_legend(colour_by, result, view) if result is not None else None
 
 
@@ -75,6 +89,27 @@ def _result_legend(colour_by: ColourBy, result: Result, view: ViewOptions) -> Le
     if colour_by is ColourBy.PROFILE:
         return _profile_legend(result, view)
     return None
+
+
+def _station_swatches(cloud: PointCloud) -> tuple[Swatch, ...]:
+    stations = stations_of(cloud)
+    listed = stations if len(stations) <= MOST_LISTED else stations[: MOST_LISTED - 1]
+    swatches = [
+        (
+            station_colour(station.station_id),
+            f"{_elided(station_label(station))} · {point_count(station.n_points)}",
+        )
+        for station in listed
+    ]
+    if n_more := len(stations) - len(listed):
+        swatches.append((NO_ELEMENT, tr("and {n} more").format(n=n_more)))
+    return tuple(swatches)
+
+
+def _elided(name: str) -> str:
+    """Return a name without its middle where it is long."""
+    half = LONGEST_NAME // 2
+    return name if len(name) <= LONGEST_NAME else f"{name[:half]}…{name[-half:]}"
 
 
 def _ticks(limits: Limits) -> tuple[tuple[float, str], ...]:

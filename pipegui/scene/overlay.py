@@ -16,7 +16,9 @@ from pipegui.scene.legend import Legend
 from pipegui.scene.measure_marks import MeasureMark, Pens, draw_marks
 from pipegui.scene.pose import Pose
 from pipegui.scene.projection import Projection
+from pipegui.scene.station_marks import StationMark, draw_stations
 from pipegui.style import theme
+from pipegui.style.colour_maps import station_colour
 from pipegui.style.colours import VERDICT
 from pipegui.style.theme import SPACING
 
@@ -81,6 +83,9 @@ class SceneOverlay(QWidget):
         self.labels: tuple[Label, ...] = ()
         self.legend: Legend | None = None
         self.marks: tuple[MeasureMark, ...] = ()
+        self.stations: tuple[StationMark, ...] = ()
+        self.colours_stations = False
+        """Whether stations are marked in the colours of their points."""
         self.handles: Array | None = None
         """Of the clip box, local coordinates, shape (n, 3)."""
         self.spot: Array | None = None
@@ -93,6 +98,7 @@ class SceneOverlay(QWidget):
         self._projection: Projection | None = None
         self._pose: Pose | None = None
         self._targets: list[tuple[QRectF, int]] = []
+        self._station_places: list[tuple[QRectF, int]] = []
         self.dark = False
         """Whether it is drawn on a dark background."""
 
@@ -104,6 +110,11 @@ class SceneOverlay(QWidget):
     def deformation_at(self, position: QPointF) -> int:
         """Id of the deformation whose label or mark is there, or 0."""
         return next((i for box, i in self._targets if box.contains(position)), 0)
+
+    def station_at(self, position: QPointF) -> int:
+        """Return the id of the station whose mark is there, or 0."""
+        places = reversed(self._station_places)  # The one drawn last lies on top.
+        return next((i for box, i in places if box.contains(position)), 0)
 
     def measurement_at(self, position: QPointF) -> int:
         """Return the number of the measurement whose closing cross is there, or -1."""
@@ -118,6 +129,9 @@ class SceneOverlay(QWidget):
         taken = [self._draw_corner(painter, self._projection, self._pose)]
         if self.legend is not None:
             taken.append(self._draw_legend(painter, self.legend))
+        self._station_places = draw_stations(
+            painter, self.stations, self._projection, self._station_colours(), self._paper()
+        )
         if self.handles is not None:
             self._draw_handles(painter, self._projection, self.handles)
         if self.ring is not None:
@@ -132,6 +146,11 @@ class SceneOverlay(QWidget):
         self.crosses = draw_marks(painter, self.marks, self._projection, pens, taken, spots)
         self._draw_labels(painter, self._projection, taken)
         painter.end()
+
+    def _station_colours(self) -> list[QColor]:
+        if not self.colours_stations:
+            return [self._tint("text")] * len(self.stations)
+        return [QColor(*station_colour(mark.station_id)) for mark in self.stations]
 
     def _draw_handles(self, painter: QPainter, projection: Projection, handles: Array) -> None:
         pixels, _ = projection.to_screen(handles)
@@ -266,7 +285,8 @@ class SceneOverlay(QWidget):
         for (red, green, blue), text in legend.swatches:
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(QColor(red, green, blue))
-            painter.drawRoundedRect(QRectF(left, top + 3, 12, 12), 2, 2)
+            middle = top + metrics.ascent() - metrics.capHeight() / 2
+            painter.drawRoundedRect(QRectF(left, middle - 6, 12, 12), 2, 2)
             painter.setPen(self._tint("text"))
             painter.drawText(QPointF(left + 2.5 * SPACING, top + metrics.ascent()), text)
             top += line

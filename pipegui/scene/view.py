@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pipecore.geometry import Array
 from pipecore.types import NO_ID, PointCloud, Profiles
 from pipegui.i18n.texts import mark, tr
-from pipegui.model.document import Background, Box, Measurement, Tool, ViewOptions
+from pipegui.model.document import Background, Box, ColourBy, Measurement, Tool, ViewOptions
 from pipegui.scene import clipping, shapes
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
@@ -26,6 +26,7 @@ from pipegui.scene.partial_cloud import PartialCloud
 from pipegui.scene.picking import warm_up
 from pipegui.scene.point_layer import PointLayer
 from pipegui.scene.pose import Pose
+from pipegui.scene.station_marks import marks_of
 from pipegui.states.view_state import SceneState
 from pipegui.style import theme
 
@@ -60,6 +61,9 @@ class SceneView(QWidget):
     """Index of the point under the resting cursor, -1 for none."""
     deformation_picked = Signal(int)
     """Id of the deformation whose label was clicked."""
+
+    station_hovered = Signal(int)
+    """Id of the station under the resting cursor."""
 
     measurement_closed = Signal(int)
     """Number of the measurement whose cross was clicked."""
@@ -124,7 +128,10 @@ class SceneView(QWidget):
         self.canvas.draw()
 
     def _update_overlay(self, state: SceneState) -> None:
-        self.overlay.legend, self.overlay.labels = None, ()
+        self.overlay.legend, self.overlay.labels, self.overlay.stations = None, (), ()
+        if state.cloud is not None:
+            self.overlay.stations = marks_of(state.cloud, state.view)
+            self.overlay.colours_stations = state.view.colour_by is ColourBy.STATION
         if state.cloud is not None and state.view.show_points:
             self.overlay.legend = make_legend(state.cloud, state.result, state.view)
         if state.result is not None and state.view.show_labels:
@@ -324,6 +331,10 @@ class SceneView(QWidget):
 
     def _hover(self) -> None:
         if self._hover_at is None:
+            return
+        if station_id := self.overlay.station_at(self._hover_at):
+            self._hovered = -1
+            self.station_hovered.emit(station_id)
             return
         index = self.layers.pick(self._hover_at, quick=True)
         if index >= 0 or self._hovered >= 0:

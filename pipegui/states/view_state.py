@@ -183,6 +183,7 @@ class TreeState:
     active: int = 0
     selection: Selection = Selection()
     hidden_elements: frozenset[int] = frozenset()
+    hidden_stations: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,13 @@ def resolve(document: Document) -> ViewState:
             profile=profile,
             profile_xyz=profile_xyz,
         ),
-        tree=TreeState(document.scans, document.active, selection, view.hidden_elements),
+        tree=TreeState(
+            document.scans,
+            document.active,
+            selection,
+            view.hidden_elements,
+            view.hidden_stations,
+        ),
         stacks=StacksState(
             document.settings.stacks,
             document.settings.profiles,

@@ -22,6 +22,12 @@ QUALITATIVE = np.array(
 """Colours that can be told apart; none is the accent of the selection."""
 
 
+def station_colour(station_id: int) -> tuple[int, int, int]:
+    """Return the colour of a station's points, by its id from 1 on."""
+    red, green, blue = QUALITATIVE[(station_id - 1) % len(QUALITATIVE)].tolist()
+    return red, green, blue
+
+
 KINDS = np.array(
     [
         [int(c[i : i + 2], 16) for i in (1, 3, 5)]

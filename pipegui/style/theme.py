@@ -5,7 +5,15 @@ from functools import cache
 
 import qtawesome
 from PySide6.QtCore import QSize, Qt
-from PySide6.QtGui import QAction, QColor, QGuiApplication, QIcon, QPalette
+from PySide6.QtGui import (
+    QAction,
+    QColor,
+    QGuiApplication,
+    QIcon,
+    QPainter,
+    QPalette,
+    QPixmap,
+)
 from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
 
 from pipecore.resources import resource
@@ -14,6 +22,9 @@ from pipegui.style.colours import ACCENT, VERDICT
 
 SPACING = 8
 """Pixels; everything is a multiple or a half of it."""
+
+SWATCH = 16
+"""Pixels of the icon that shows a colour."""
 
 _LIGHT = {
     "window": "#f5f6f8",
@@ -169,6 +180,21 @@ def refresh_icons(window: QWidget) -> None:
 def verdict_icon(verdict: Verdict) -> QIcon:
     """Return the icon of a verdict in its colour."""
     return icon(VERDICT_ICON[verdict], VERDICT[verdict])
+
+
+@cache
+def swatch_icon(shade: tuple[int, int, int]) -> QIcon:
+    """Return a small square of a colour, as legends have it."""
+    pixmap = QPixmap(2 * SWATCH, 2 * SWATCH)
+    pixmap.setDevicePixelRatio(2)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(*shade))
+    painter.drawRoundedRect(2, 2, SWATCH - 4, SWATCH - 4, 2, 2)
+    painter.end()
+    return QIcon(pixmap)
 
 
 def icon_size(multiple: float = 2.25) -> QSize:

@@ -148,6 +148,7 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
         _option("show_ellipses", "Ellipses", "Show the ellipses of the profiles", "E"),
         _option("show_surfaces", "Fitted surfaces", "Show the fitted shapes, translucent", "S"),
         _option("show_labels", "Labels", "Name the deformations in the 3D view", "L"),
+        _option("show_stations", "Scanner positions", "Mark where the scanner stood"),
         *_inside(
             "Profiles of a stack",
             _A(
@@ -386,6 +387,7 @@ VIEW_OPTIONS = (
     "show_ellipses",
     "show_surfaces",
     "show_labels",
+    "show_stations",
     "fly",
     "is_parallel",
     "eye_dome",

@@ -21,6 +21,8 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
         "detect_around",
         "delete",
     ),
+    NodeKind.STATIONS: ("show_stations", "show_all"),
+    NodeKind.STATION: ("show_stations", "show_all"),
     NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
     NodeKind.DEFORMATION: ("zoom", "isolate", "", "accept", "reject", "reopen"),
 }

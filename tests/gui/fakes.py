@@ -31,6 +31,7 @@ class FakeView(QWidget):
 class FakeScene(FakeView):
     picked = Signal(int)
     hovered = Signal(int)
+    station_hovered = Signal(int)
     deformation_picked = Signal(int)
     measurement_closed = Signal(int)
     clip_dragged = Signal(object)
