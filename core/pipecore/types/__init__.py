@@ -1,0 +1,36 @@
+"""The nouns of the pipeline: cloud, stack, profile, element, deformation, result.
+
+All lengths are metres and all angles radians unless a name says otherwise. Geometry
+is in *local* coordinates: world coordinates less the cloud's `origin`. Quantities
+that the scan cannot carry are nan, never a guess.
+"""
+
+from pipecore.types.arrays import Array, Floats
+from pipecore.types.cloud import Field, PointCloud
+from pipecore.types.deformation import Deformation, DeformationKind, Review, ReviewState, Verdict
+from pipecore.types.element import KIND_LABELS, Element, ElementKind, NominalSize
+from pipecore.types.ids import NO_ID
+from pipecore.types.profiles import Profiles
+from pipecore.types.result import Result
+from pipecore.types.stack import OWN_STACK, Stack
+
+__all__ = [
+    "KIND_LABELS",
+    "NO_ID",
+    "OWN_STACK",
+    "Array",
+    "Deformation",
+    "DeformationKind",
+    "Element",
+    "ElementKind",
+    "Field",
+    "Floats",
+    "NominalSize",
+    "PointCloud",
+    "Profiles",
+    "Result",
+    "Review",
+    "ReviewState",
+    "Stack",
+    "Verdict",
+]

@@ -1,0 +1,191 @@
+"""Points of one or several scans, with what a file says of each."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pipecore.caller_arrays import check_column, check_coordinates, check_positions
+from pipecore.display import Summarised
+from pipecore.local_frame import choose_origin, to_local
+from pipecore.notes import Note
+from pipecore.types.arrays import Array, Floats
+from pipecore.units import FileUnit
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """More values of each point, as a file stores them.
+
+    Parameters
+    ----------
+    values : ndarray
+        Of any integer or floating type, shape (n,) or (n, k).
+    scale, offset : float
+        What stands for a stored value v is scale · v + offset.
+    no_data : float, optional
+        The stored value that stands for none.
+    description : str
+        What the file says of it.
+    """
+
+    values: NDArray[Any]
+    scale: float = 1.0
+    offset: float = 0.0
+    no_data: float | None = None
+    description: str = ""
+
+    def scaled(self) -> Array:
+        """Return what the stored values stand for, float64; nan where there is none."""
+        scaled = self.values * self.scale + self.offset
+        if self.no_data is not None:
+            scaled = np.where(self.values == self.no_data, np.nan, scaled)
+        return np.asarray(scaled, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointCloud(Summarised):
+    """Points of one or several scans in one coordinate system.
+
+    Made by `read` from files and by `from_points` from arrays; the constructor takes what
+    is in its final form, and checks nothing.
+
+    Parameters
+    ----------
+    origin : ndarray
+        World coordinates of the local zero, float64, shape (3,).
+    xyz : ndarray
+        Local coordinates, shape (n, 3), C-contiguous; float32 where that keeps 0.1 mm
+        (extents up to a kilometre), else float64. All finite.
+    intensity : ndarray, optional
+        As in the file, float32, shape (n,).
+    rgb : ndarray, optional
+        uint8, shape (n, 3).
+    classification : ndarray, optional
+        ASPRS classes, uint8, shape (n,).
+    station : ndarray, optional
+        Id of the station that each point was scanned from, from 1 on, uint16, shape (n,);
+        None where nothing tells.
+    station_names : tuple of str
+        Where each station comes from: a file, or a file and a scan in it.
+    stations : ndarray
+        Scanner positions in local coordinates, shape (k, 3): of the stations in the order
+        of their ids, nan where a file does not know one.
+    crs : str
+        The coordinate reference system's name, or "".
+    crs_wkt : str
+        Its well-known text, where the file or its EPSG code gives one, or "".
+    unit : FileUnit
+        Unit of the coordinates in the file.
+    step : float
+        Steps in which the file keeps coordinates, metres, where they are coarse (rounding
+        adds an SD of step/√12 to each); 0 where they are fine.
+    fields : mapping of str to Field
+        More values of each point, as the file has them, where `read` was asked for them.
+    notes : tuple of Note
+        What a reader should know of the file: what was left out, its unit, its errors.
+    source : Path, optional
+        The file it was read from.
+    """
+
+    origin: Array
+    xyz: Floats
+    intensity: NDArray[np.float32] | None = None
+    rgb: NDArray[np.uint8] | None = None
+    classification: NDArray[np.uint8] | None = None
+    station: NDArray[np.uint16] | None = None
+    station_names: tuple[str, ...] = ()
+    stations: Array = field(default_factory=lambda: np.empty((0, 3)))
+    crs: str = ""
+    crs_wkt: str = ""
+    unit: FileUnit = FileUnit()
+    step: float = 0.0
+    fields: Mapping[str, Field] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
+    source: Path | None = None
+
+    @classmethod
+    def from_points(
+        cls,
+        xyz: ArrayLike,
+        *,
+        intensity: ArrayLike | None = None,
+        rgb: ArrayLike | None = None,
+        classification: ArrayLike | None = None,
+        stations: ArrayLike | None = None,
+        crs: str = "",
+    ) -> "PointCloud":
+        """Make a cloud of arrays, which are checked and copied.
+
+        Parameters
+        ----------
+        xyz : array_like
+            World coordinates in metres, shape (n, 3). float64, or float32 where that is
+            fine enough: at 400 km its steps are 3 cm.
+        intensity : array_like, optional
+            Shape (n,).
+        rgb : array_like, optional
+            Whole numbers from 0 to 255, shape (n, 3).
+        classification : array_like, optional
+            ASPRS classes, shape (n,).
+        stations : array_like, optional
+            Scanner positions in world coordinates, shape (3,) or (k, 3). They say along
+            which line each point's noise is, which makes radii better.
+        crs : str
+            The coordinate reference system's name.
+
+        Returns
+        -------
+        PointCloud
+            Its origin is a whole multiple of 100 m near the middle of the points.
+
+        Raises
+        ------
+        TypeError
+            If an array does not hold numbers of the kind that it should.
+        ValueError
+            If an array has another shape or length, or holds values that are not finite or
+            out of range.
+        """
+        world = check_coordinates(xyz)
+        origin = choose_origin(world) if len(world) else np.zeros(3)
+        n = len(world)
+        return cls(
+            origin=origin,
+            xyz=to_local(world, origin),
+            intensity=None
+            if intensity is None
+            else check_column(intensity, "the intensity", n, np.float32),
+            rgb=None if rgb is None else check_column(rgb, "the colours", n, np.uint8, 3),
+            classification=None
+            if classification is None
+            else check_column(classification, "the classes", n, np.uint8),
+            stations=np.empty((0, 3)) if stations is None else check_positions(stations) - origin,
+            crs=crs,
+        )
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self.xyz)
+
+    def _title(self) -> str:
+        return "PointCloud"
+
+    def _facts(self) -> dict[str, str]:
+        columns = ("intensity", "rgb", "classification")
+        facts = {
+            "points": f"{len(self):,}",
+            "origin": "({:.10g}, {:.10g}, {:.10g}) m".format(*self.origin.tolist()),
+            "with": " + ".join(c for c in columns if getattr(self, c) is not None),
+            "scanner positions": str(len(self.stations) or ""),
+            "crs": self.crs,
+            "source": self.source.name if self.source else "",
+        }
+        return {name: text for name, text in facts.items() if text}
+
+    def world(self, local: Array) -> Array:
+        """World coordinates (float64) of local ones, any shape (..., 3)."""
+        return np.asarray(local, dtype=np.float64) + self.origin

@@ -1,0 +1,142 @@
+"""Deformations of elements, what a rule says of them, and what a person does."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from pipecore.display import Summarised
+from pipecore.formatting import format_clock, format_measure
+from pipecore.reasons import Reason
+from pipecore.types.arrays import Array
+from pipecore.types.ids import NO_ID
+
+
+class DeformationKind(StrEnum):
+    """What a deformation is; the values are those of the report."""
+
+    DENT = "dent"
+    BULGE = "bulge"
+    OVALITY = "ovality"
+    BOW = "bow"
+    KINK = "kink"
+
+
+class Verdict(StrEnum):
+    """What the chosen rule says of a deformation; the values are those of the report."""
+
+    ACCEPT = "accept"
+    REVIEW = "review"
+    REJECT = "reject"
+    NOT_MEASURABLE = "not measurable"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Deformation(Summarised):
+    """A place where an element leaves its shape.
+
+    Parameters
+    ----------
+    deformation_id, element_id : int
+    kind : DeformationKind
+    chainage, chainage_start, chainage_end : float
+        Of the peak and of the extent, metres from the element's start.
+    clock : float
+        Clock angle of the peak, radians, 0 = 12:00, clockwise looking along the chainage.
+    peak : ndarray
+        The peak on the surface, shape (3,).
+    depth, depth_sd : float
+        Magnitude (outward for a bulge) against the undented contour, metres.
+    length, width : float
+        Extent along the axis and around the circumference, metres.
+    ovality, strain : float
+        As ratios; nan where they do not apply or cannot be measured.
+    n_points : int
+    rule : str
+        Name of the rule that gave the verdict.
+    verdict : Verdict
+    significance : float
+        Depth in units of its own noise.
+    area, volume : float
+        Of a dent or bulge: what it covers of the undented surface (m²), and what lies
+        between the two surfaces (m³); nan for the other kinds.
+    fitting_id : int
+        The nearest flange, bend or other fitting of the run, `NO_ID` if it has none; the
+        own element's id if the deformation lies on a fitting.
+    fitting_distance : float
+        Distance along the run from the peak to where that begins, metres; 0 on a fitting.
+    next_id : int
+        The nearest other dent or bulge of the run, `NO_ID` if there is none.
+    next_distance : float
+        Distance over the surface from edge to edge of the two, metres; 0 if they overlap.
+    interacts : bool
+        Whether that is at most one outside diameter.
+    not_measurable : mapping of str to Reason
+        Why what is nan could not be measured, by the name of the field; what does not
+        apply to the kind is not in it. Empty where all was measured.
+    """
+
+    deformation_id: int
+    element_id: int
+    kind: DeformationKind
+    chainage: float
+    chainage_start: float
+    chainage_end: float
+    clock: float
+    peak: Array
+    depth: float
+    depth_sd: float
+    length: float
+    width: float
+    ovality: float = np.nan
+    strain: float = np.nan
+    n_points: int = 0
+    rule: str = ""
+    verdict: Verdict = Verdict.NOT_MEASURABLE
+    significance: float = np.nan
+    area: float = np.nan
+    volume: float = np.nan
+    fitting_id: int = NO_ID
+    fitting_distance: float = np.nan
+    next_id: int = NO_ID
+    next_distance: float = np.nan
+    interacts: bool = False
+    not_measurable: Mapping[str, Reason] = field(default_factory=dict)
+
+    def _title(self) -> str:
+        return f"Deformation {self.deformation_id}"
+
+    def _facts(self) -> dict[str, str]:
+        size = "height" if self.kind is DeformationKind.BULGE else "depth"
+        facts = {
+            "kind": str(self.kind),
+            "element": str(self.element_id),
+            size: format_measure(1000 * self.depth, 1000 * self.depth_sd, "mm"),
+            "chainage": f"{self.chainage:.3f} m",
+            "clock": format_clock(self.clock),
+            "verdict": str(self.verdict),
+        }
+        return {name: text for name, text in facts.items() if text}
+
+
+class ReviewState(StrEnum):
+    """What a person decided about a deformation; the values are those of the report."""
+
+    OPEN = "open"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+
+
+@dataclass(frozen=True)
+class Review:
+    """A person's word on a deformation, beside the rule's verdict.
+
+    Parameters
+    ----------
+    state : ReviewState
+    comment : str
+    """
+
+    state: ReviewState = ReviewState.OPEN
+    comment: str = ""

@@ -1,0 +1,141 @@
+"""Elements: pipes, bends, reducers and whatever else a run is made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from pipecore.display import Summarised
+from pipecore.formatting import format_measure
+from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.reasons import Reason
+from pipecore.types.arrays import Array
+
+
+class ElementKind(StrEnum):
+    """What an element is; the values are those of the report."""
+
+    CYLINDER = "cylinder"
+    CONE = "cone"
+    SPHERE = "sphere"
+    TORUS = "torus"
+    FLANGE = "flange"
+    TEE = "tee"
+    OTHER = "other"
+
+
+KIND_LABELS = {
+    ElementKind.CYLINDER: "Pipe",
+    ElementKind.CONE: "Reducer",
+    ElementKind.SPHERE: "Sphere",
+    ElementKind.TORUS: "Bend",
+    ElementKind.FLANGE: "Flange",
+    ElementKind.TEE: "Tee",
+    ElementKind.OTHER: "Element",
+}
+"""Label of an element of a kind that has no name of its own, such as "Pipe"."""
+
+
+@dataclass(frozen=True)
+class NominalSize:
+    """A catalogue size: its name (such as "DN 150 / NPS 6") and outside diameter in metres.
+
+    Parameters
+    ----------
+    name : str
+        Such as "DN 150 / NPS 6".
+    outside_diameter : float
+        Metres.
+    """
+
+    name: str
+    outside_diameter: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Element(Summarised):
+    """One piece of a pipe run with one kind of surface about one axis.
+
+    Parameters
+    ----------
+    element_id, run_id : int
+    kind : ElementKind
+    axis : LineAxis or ArcAxis
+        As scanned: it starts and ends where the points do. A sphere's axis is the
+        straight line along which its profiles were cut; see `centre`.
+    radius, radius_sd : float
+        Radius (at the start for a cone) and its standard deviation, metres.
+    radius_end : float
+        Radius at the end of a cone; equal to `radius` for the other kinds.
+    centre : ndarray
+        Centre of a sphere or of a torus's bend, shape (3,); nan for the other kinds.
+    n_points, n_profiles : int
+        Points of the full cloud on it; profiles with an accepted ellipse.
+    arc : float
+        Median arc around the axis that its profiles see, radians.
+    rms : float
+        Root mean square of the points' distances from the fitted surface, metres.
+    ovality, ovality_sd : float
+        (Dmax - Dmin) / Dnom as a ratio; nan where the arc cannot carry it.
+    straightness : float
+        Largest distance of the measured axis from the chord of its ends, metres.
+    nominal : NominalSize, optional
+        The catalogue size within tolerance, if any.
+    gaps : tuple of (float, float)
+        Chainage ranges without profiles (paper, figure 11).
+    not_measurable : mapping of str to Reason
+        Why what is nan could not be measured, by the name of the field; what does not
+        apply to the kind is not in it.
+    name : str
+        What the user calls it, or "".
+    """
+
+    element_id: int
+    run_id: int
+    kind: ElementKind
+    axis: LineAxis | ArcAxis
+    radius: float
+    radius_sd: float
+    radius_end: float
+    centre: Array
+    n_points: int
+    n_profiles: int
+    arc: float
+    rms: float
+    ovality: float = np.nan
+    ovality_sd: float = np.nan
+    straightness: float = np.nan
+    nominal: NominalSize | None = None
+    gaps: tuple[tuple[float, float], ...] = ()
+    not_measurable: Mapping[str, Reason] = field(default_factory=dict)
+    name: str = ""
+
+    @property
+    def label(self) -> str:
+        """What people call it: its own name, else such as "Pipe 3" or "Bend 4"."""
+        return self.name or f"{KIND_LABELS[self.kind]} {self.element_id}"
+
+    def _title(self) -> str:
+        return f"Element {self.label}"
+
+    def _facts(self) -> dict[str, str]:
+        facts = {
+            "run": str(self.run_id),
+            "size": self.nominal.name if self.nominal else "",
+            "radius": format_measure(1000 * self.radius, 1000 * self.radius_sd, "mm"),
+            "length": f"{self.axis.length:.3f} m",
+            "arc": f"{np.rad2deg(self.arc):.0f}°",
+            "ovality": format_measure(100 * self.ovality, 100 * self.ovality_sd, "%"),
+            "points": f"{self.n_points:,}",
+        }
+        return {name: text for name, text in facts.items() if text}
+
+    def radius_at(self, chainage: Array | float) -> Array:
+        """Radius of the fitted surface about the axis at `chainage`, metres."""
+        s = np.asarray(chainage, dtype=np.float64)
+        if self.kind is ElementKind.SPHERE:
+            along = (self.centre - self.axis.start) @ self.axis.tangent(0.0)
+            return np.sqrt(np.maximum(self.radius**2 - (s - along) ** 2, 0.0))
+        slope = (self.radius_end - self.radius) / self.axis.length
+        return np.asarray(self.radius + slope * s)
