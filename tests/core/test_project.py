@@ -95,3 +95,10 @@ def test_that_the_wheel_of_the_app_holds_the_app_alone(tmp_path: Path) -> None:
     unpacked = tmp_path / "unpacked"
     assert (unpacked / "pipegui" / "window" / "main_window.py").is_file()
     assert not (unpacked / "pipecore").exists()
+
+
+@pytest.mark.parametrize("folder", [ROOT, ROOT / "core"], ids=["app", "library"])
+def test_that_every_wheel_brings_the_licence(folder: Path, tmp_path: Path) -> None:
+    build_wheel(folder, tmp_path)
+    (brought,) = (tmp_path / "unpacked").glob("*.dist-info/licenses/LICENSE")
+    assert brought.read_bytes() == (ROOT / "LICENSE").read_bytes()
