@@ -16,6 +16,7 @@ from pipegui.controllers.hovering import Hovering
 from pipegui.controllers.preferences import Preferences
 from pipegui.controllers.project_session import ProjectSession
 from pipegui.controllers.remembered_choices import remember_choices, remember_tab
+from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.scans import Scans
 from pipegui.controllers.session import Session
 from pipegui.controllers.settings_files import SettingsFiles
@@ -66,8 +67,10 @@ def compose(
         autosave = Autosave(
             session, copies, project.saving, project.snapshot, lambda: project.has_unsaved_work
         )
+    rereading = Rereading(session)
     controllers = Controllers(
-        Scans(session, window),
+        Scans(session, window, rereading),
+        rereading,
         project,
         ElementEdits(session, window),
         Clicks(session),

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipecore.settings import LengthUnit
 from pipecore.types import ReviewState
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.autosave import Autosave
@@ -13,6 +14,7 @@ from pipegui.controllers.exports import Exports
 from pipegui.controllers.hovering import Hovering
 from pipegui.controllers.preferences import Preferences
 from pipegui.controllers.project_session import ProjectSession
+from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.scans import Scans
 from pipegui.controllers.session import Session
 from pipegui.controllers.settings_files import SettingsFiles
@@ -35,6 +37,7 @@ class Controllers:
     """All controllers of a session."""
 
     scans: Scans
+    rereading: Rereading
     project: ProjectSession
     element_edits: ElementEdits
     clicks: Clicks
@@ -59,6 +62,7 @@ def handlers(
         "save": project.save,
         "save_as": project.save_as,
         "close_scan": scans.close_active,
+        "join_scans": controllers.rereading.join_all,
         "load_settings": controllers.settings_files.load,
         "save_settings": controllers.settings_files.save,
         "quit": window.close,
@@ -117,6 +121,9 @@ def handlers(
         name = f"background_{background.name.lower()}"
         # A click on the one that is chosen chooses it again.
         found[name] = lambda _, b=background: do(commands.set_view, background=b)
+    for unit in LengthUnit:
+        # A click on the one that is chosen chooses it again.
+        found[f"unit_{unit}"] = lambda _, u=unit: controllers.rereading.in_unit(u)
     for appearance in Appearance:
         name = f"appearance_{appearance.name.lower()}"
         found[name] = lambda _, a=appearance: preferences.choose_appearance(a)
@@ -289,6 +296,8 @@ def connect_jobs(window: MainWindow, session: Session, controllers: Controllers)
     jobs.cancelled.connect(lambda title: show(tr("{title} was cancelled.").format(title=title)))
     jobs.failed.connect(lambda message, details: show(message, "error", details))
     jobs.scan_read.connect(controllers.scans.on_scan_read)
+    jobs.scan_read_again.connect(controllers.scans.on_scan_read_again)
+    jobs.read_failed.connect(lambda _, message, details: show(message, "error", details))
     jobs.detected.connect(controllers.scans.on_detected)
     jobs.edited.connect(controllers.element_edits.on_edited)
     jobs.written.connect(lambda path: show(tr("Saved “{path}”.").format(path=path)))

@@ -17,6 +17,7 @@ from babel.messages.pofile import read_po, write_po
 from pipecore.editing import STAGES as EDITING_STAGES
 from pipecore.formatting import NOT_MEASURABLE
 from pipecore.io import file_filter
+from pipecore.io.coordinates import UNIT_LABELS
 from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
 from pipecore.resources import resource
@@ -80,6 +81,7 @@ def tables() -> Iterator[str]:
         yield from (str(value) for value in enum)
     yield from KIND_LABELS.values()
     yield from MEASURE_TEXTS.values()
+    yield from UNIT_LABELS.values()
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():

@@ -19,6 +19,7 @@ from pipegui.project.cloud_reference import CloudState
 from pipegui.project.project_file import (
     SUFFIX,
     Camera,
+    ProjectError,
     SavedProject,
     read_project,
     work_of,
@@ -303,16 +304,18 @@ class ProjectSession(QObject):
             scans = []
             for number, path in sorted(places.items()):
                 scan, fingerprint = saved.scans[number], Fingerprint.if_there(path)
-                unit = {"input.length_unit": scan.cloud.length_unit}
+                reading = scan.cloud.how_read(saved.settings)
                 try:
-                    cloud = read(path, saved.settings.replace(unit), progress)
+                    others = saved.other_files(number)
+                    cloud = read((path, *others), reading, progress)
                 except CancelledError:
                     raise
-                except ReadError as error:
+                except (ReadError, ProjectError) as error:
                     raise ReadError(
                         tr("The project was not opened: {error}").format(error=error_text(error))
                     ) from error
-                scans.append(scan.with_cloud(replace(cloud, source=path), fingerprint))
+                cloud = replace(cloud, source=path)
+                scans.append(scan.with_cloud(cloud, reading, fingerprint, others))
             return tuple(scans)
 
         self._session.jobs.run(

@@ -1,20 +1,31 @@
 """Scans and detections: opening files, detecting, and what comes of both."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
+from pipecore.io.left_out import NO_RETURN, left_out_notes
 from pipecore.resources import resource
 from pipecore.types import PointCloud, Result
 from pipegui.controllers import file_dialogs
+from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.session import Session
 from pipegui.i18n.reason_texts import reason_text
-from pipegui.i18n.texts import tr
+from pipegui.i18n.texts import count, tr
 from pipegui.model import commands
 from pipegui.model.document import Scan
 from pipegui.project.project_file import SUFFIX
 from pipegui.states import descriptions
+from pipegui.states.unit_texts import doubts_unit, other_units, units_in_doubt
+
+HARMLESS = {note.template for note in left_out_notes("", {NO_RETURN: 1})}
+"""Notes on what is as it should be."""
+
+
+MOST_LINES = 3
+"""Of a message about what was read; all are among the properties of the scan."""
 
 
 class Scans(QObject):
@@ -24,9 +35,11 @@ class Scans(QObject):
     """Path of a project among the files to open."""
     recent_files_changed = Signal()
 
-    def __init__(self, session: Session, window: QWidget) -> None:
+    def __init__(self, session: Session, window: QWidget, rereading: Rereading) -> None:
         super().__init__(session)
-        self._session, self._window = session, window
+        self._session, self._window, self._rereading = session, window, rereading
+        self._together: list[Scan] = []
+        """Scans that were opened together."""
 
     # Opening
 
@@ -44,18 +57,47 @@ class Scans(QObject):
         if projects:
             self.project_chosen.emit(projects[0])
         scans = [path for path in paths if path not in projects]
-        self._session.jobs.open_files(scans, self._session.document.settings)
+        self._together = []
+        self._session.jobs.open_files(scans, self._session.document.settings.input)
 
     def on_scan_read(self, scan: Scan) -> None:
         """Add a scan that was read; what was left out or guessed of it is said."""
-        self._session.hide_message()
         self._session.do(commands.open_scan, scan)
-        if scan.cloud.notes:
-            notes = " ".join(reason_text(note) for note in scan.cloud.notes)
-            self._session.show_message(f"{scan.name}: {notes}", "warning")
+        self._together.append(scan)
+        self._tell(self._together)
         if scan.cloud.source is not None:
             file_dialogs.remember(self._session.stored, scan.cloud.source)
             self.recent_files_changed.emit()
+
+    def on_scan_read_again(self, clouds: Sequence[PointCloud], scan: Scan) -> None:
+        """Put a scan in the place of those that it was read from anew."""
+        self._together = []
+        self._rereading.on_read_again(clouds, scan)
+        self._tell([scan])
+
+    def _tell(self, scans: Sequence[Scan]) -> None:
+        """Say what was left out or guessed of scans, with what can be done about it."""
+        self._session.hide_message()
+        notes = [note for scan in scans for note in scan.cloud.notes]
+        notes.sort(key=lambda note: not doubts_unit(note))
+        lines = [reason_text(note) for note in notes]
+        answers: dict[str, Callable[[], object]] = {}
+        if len(scans) > 1:
+            lines.insert(0, tr("{n} scans were opened.").format(n=len(scans)))
+            opened = tuple(scans)
+            answers[tr("Join to one cloud")] = lambda: self._rereading.join(opened)
+        else:
+            answers |= self._rereading.offers(scans[0], units_in_doubt(scans[0]))
+        is_warning = any(note.template not in HARMLESS for note in notes)
+        if lines:
+            severity = "warning" if is_warning else "info"
+            text = "\n".join(lines)
+            if (n_more := len(lines) - MOST_LINES) > 0:
+                more = count("One more note: Details", "{n} more notes: Details", n_more)
+                short = "\n".join([*lines[:MOST_LINES], more])
+                self._session.show_message(short, severity, text, answers)
+            else:
+                self._session.show_message(text, severity, answers=answers)
 
     def close_active(self) -> None:
         """Close the active scan."""
@@ -84,4 +126,10 @@ class Scans(QObject):
         active = session.document.scan
         scan = next((s for s in session.document.scans if s.cloud is cloud), None)
         whose = f"{scan.name}: " if scan is not None and scan is not active else ""
-        session.show_message(f"{whose}{descriptions.summary(result)}{hint}.{took}", severity)
+        answers = (
+            self._rereading.offers(scan, other_units(scan))
+            if scan is not None and not result.elements
+            else {}
+        )
+        text = f"{whose}{descriptions.summary(result)}{hint}.{took}"
+        session.show_message(text, severity, answers=answers)

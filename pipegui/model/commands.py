@@ -4,7 +4,7 @@ A command with `undo_text` is a step that can be undone; the others (view, selec
 change the present document only.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -76,6 +76,28 @@ def close_scan(document: Document, index: int) -> Document:
     """Remove a scan; the one before it becomes active."""
     scans = document.scans[:index] + document.scans[index + 1 :]
     return activate_scan(replace(document, scans=scans, active=0), max(index - 1, 0))
+
+
+@step(mark("Read again"))
+def replace_scan(document: Document, cloud: PointCloud, scan: Scan) -> Document:
+    """Put a scan in the place of the one with `cloud`; nothing changes if that was closed."""
+    return _put_in_place(document, [cloud], scan)
+
+
+@step(mark("Join scans"))
+def join_scans(document: Document, clouds: Sequence[PointCloud], scan: Scan) -> Document:
+    """Put one scan in the place of those with these clouds."""
+    return _put_in_place(document, clouds, scan)
+
+
+def _put_in_place(document: Document, clouds: Sequence[PointCloud], scan: Scan) -> Document:
+    gone = {id(cloud) for cloud in clouds}
+    places = [i for i, other in enumerate(document.scans) if id(other.cloud) in gone]
+    if not places:
+        return document
+    scans = [other for other in document.scans if id(other.cloud) not in gone]
+    scans.insert(places[0], scan)
+    return activate_scan(replace(document, scans=tuple(scans)), places[0])
 
 
 def activate_scan(document: Document, index: int) -> Document:

@@ -7,8 +7,9 @@ earlier one.
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from pathlib import Path
 
-from pipecore.settings import LengthUnit, Settings
+from pipecore.settings import InputSettings, Settings
 from pipecore.types import NO_ID, OWN_STACK, PointCloud, Result, Review
 from pipegui.model.fingerprint import Fingerprint
 
@@ -128,14 +129,11 @@ class ViewOptions:
     colour_by: ColourBy = ColourBy.RGB
     deviation_limit_mm: float = 10.0
     hidden_elements: frozenset[int] = frozenset()
-    hidden_stations: frozenset[int] = frozenset()
     show_points: bool = True
     show_axes: bool = True
     show_ellipses: bool = False
     show_surfaces: bool = False
     show_labels: bool = True
-    show_stations: bool = True
-    """Whether it is marked where the scanner stood."""
     shown_stack: int = NO_ID
     """The stack whose profiles are shown in colour, with `ColourBy.PROFILE`."""
     plot_stack: int = OWN_STACK
@@ -162,6 +160,9 @@ class ViewOptions:
     """Local heights at the ends of the colours, metres; None: the range of nearly all points."""
     intensity_limits: Limits | None = None
     """The same for intensities."""
+    hidden_stations: frozenset[int] = frozenset()
+    show_stations: bool = True
+    """Whether it is marked where the scanner stood."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,11 +175,22 @@ class Scan:
     reviews: Mapping[int, Review] = field(default_factory=dict)
     """By the ids of the deformations; those without a review are not in it."""
 
-    length_unit: LengthUnit = LengthUnit.METRE
-    """Unit in which the file was read."""
+    reading: InputSettings = field(default_factory=InputSettings)
+    """Settings with which it was read."""
 
     fingerprint: Fingerprint | None = None
     """Of the file when the cloud was read, if it was taken."""
+
+    others: tuple[Path, ...] = ()
+    """More files of the same cloud, besides its source."""
+
+    guessed_columns: str = ""
+    """What the columns of a text file were taken for, where nothing in it says so."""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that the cloud was read from."""
+        return () if self.cloud.source is None else (self.cloud.source, *self.others)
 
     def review(self, deformation_id: int) -> Review:
         """Return the review of a deformation, an open one if there is none."""

@@ -87,6 +87,7 @@ class MessageBar(QFrame):
         for text, act in answers.items():
             button = QToolButton()
             button.setText(text)
+            button.setProperty("answer", True)
             button.clicked.connect(self.hide)
             button.clicked.connect(lambda _=False, act=act: act())
             self._row.insertWidget(self._row.count() - 1, button)

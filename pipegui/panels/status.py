@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QStatusBar, QTo
 
 from pipegui.i18n.texts import tr
 from pipegui.states import descriptions
+from pipegui.states.unit_texts import unit_text
 from pipegui.states.view_state import WindowState
 from pipegui.style import theme
 from pipegui.work.worker import Progressed
@@ -60,8 +61,9 @@ class StatusBar(QStatusBar):
             self.cursor_position.clear()
             return
         cloud = state.scan.cloud
-        parts = [descriptions.point_count(len(cloud)), *([cloud.crs] if cloud.crs else [])]
-        self.scan.setText(" · ".join(parts))
+        parts = (descriptions.point_count(len(cloud)), cloud.crs, unit_text(cloud.unit))
+        self.scan.setText(" · ".join(filter(None, parts)))
+        self.scan.setToolTip(tr("Points, reference system and unit of the file"))
 
     def start(self, title: str) -> None:
         """Show that a job has begun."""

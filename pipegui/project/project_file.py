@@ -26,7 +26,7 @@ from pipecore.consistency import check_result
 from pipecore.errors import PipecoreError
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress
-from pipecore.settings import Settings
+from pipecore.settings import InputSettings, Settings
 from pipecore.types import Deformation, Element, Profiles, Result, Review, Stack
 from pipegui.i18n.texts import tr
 from pipegui.model.document import Document, Scan, Selection, ViewOptions
@@ -72,7 +72,11 @@ class SavedScan:
     reviews: Mapping[int, Review]
 
     def with_cloud(
-        self, cloud: pipecore.PointCloud, fingerprint: Fingerprint | None = None
+        self,
+        cloud: pipecore.PointCloud,
+        reading: InputSettings,
+        fingerprint: Fingerprint | None = None,
+        others: tuple[Path, ...] = (),
     ) -> Scan:
         """Return the scan with its cloud; `ProjectError` if that does not fit."""
         if len(cloud) != self.cloud.n_points:
@@ -95,7 +99,7 @@ class SavedScan:
                     "it is another scan, or was read in another unit."
                 ).format(source=cloud.source, name=self.name)
             )
-        return Scan(self.name, cloud, result, self.reviews, self.cloud.length_unit, fingerprint)
+        return Scan(self.name, cloud, result, self.reviews, reading, fingerprint, others)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,18 @@ class SavedProject:
     def located(self) -> list[tuple[Path, CloudState]]:
         """Find the cloud of each scan."""
         return [scan.cloud.locate(self.path.parent) for scan in self.scans]
+
+    def other_files(self, number: int) -> tuple[Path, ...]:
+        """Find the other files of a scan's cloud; `ProjectError` if one is not as it was."""
+        found = [(ref, *ref.locate(self.path.parent)) for ref in self.scans[number].cloud.others]
+        for reference, _, state in found:
+            if state is not CloudState.FOUND:
+                raise ProjectError(
+                    tr("“{file}”, a part of “{name}”, is not there or has changed.").format(
+                        file=reference.path, name=self.scans[number].name
+                    )
+                )
+        return tuple(path for _, path, _ in found)
 
     def document(self, scans: tuple[Scan, ...]) -> Document:
         """Return the document of the scans with their clouds; some may be left out."""

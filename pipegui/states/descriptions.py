@@ -34,6 +34,7 @@ from pipegui.model.document import Scan, Selection
 from pipegui.model.result_queries import stack_name
 from pipegui.model.stations import Station, has_stations, stations_of
 from pipegui.model.view_commands import extent
+from pipegui.states.unit_texts import unit_text
 from pipegui.states.view_state import PropertiesState
 
 OVALITY = "(Dmax − Dmin) / Dnom"
@@ -239,8 +240,17 @@ def _of_scan(scan: Scan) -> Iterator[Property | Heading]:
         )
     if cloud.crs:
         yield Property(tr("Coordinates"), cloud.crs, cloud.crs)
-    if cloud.source is not None:
-        yield Property(tr("File"), cloud.source.name, str(cloud.source), hint=str(cloud.source))
+    in_metres = tr("Of the coordinates in the file; here they are in metres.")
+    yield Property(tr("Unit"), unit_text(cloud.unit), str(cloud.unit), hint=in_metres)
+    if scan.files:
+        names = ", ".join(path.name for path in scan.files)
+        paths = "\n".join(map(str, scan.files))
+        yield Property(
+            tr("File") if len(scan.files) == 1 else tr("Files"), names, paths, hint=paths
+        )
+    if cloud.notes:
+        notes = [reason_text(note) for note in cloud.notes]
+        yield Property(tr("Notes"), " ".join(notes), "\n".join(notes), hint="\n".join(notes))
     if scan.result is not None:
         seconds = sum(scan.result.seconds.values())
         yield Property(

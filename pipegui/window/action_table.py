@@ -6,8 +6,10 @@ given by name to `pipegui.window.actions.Actions`, so that the table stays a tab
 
 from dataclasses import dataclass, replace
 
+from pipecore.settings import LengthUnit
 from pipegui.i18n.texts import LANGUAGES
 from pipegui.model.document import Background
+from pipegui.states.unit_texts import UNIT_NAMES
 from pipegui.style import theme
 
 
@@ -49,6 +51,11 @@ def _appearance(appearance: theme.Appearance) -> ActionSpec:
 def _language(code: str) -> ActionSpec:
     name, tip = f"language_{code or 'system'}", "Language of the window"
     return ActionSpec(name, LANGUAGES[code], tip, is_checkable=True)
+
+
+def _unit(unit: LengthUnit) -> ActionSpec:
+    tip = "Read the scan anew with its coordinates in this unit"
+    return ActionSpec(f"unit_{unit}", UNIT_NAMES[unit], tip, "", "", "scan", is_checkable=True)
 
 
 def _inside(title: str, *specs: ActionSpec) -> tuple[ActionSpec, ...]:
@@ -270,7 +277,16 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     ),
     "Cloud": (
         _A("next_scan", "Next scan", "Look at the next open scan", "", "Ctrl+Tab", "scans"),
+        _A(
+            "join_scans",
+            "Join all scans",
+            "Take all open scans as one cloud, each of them a station",
+            "set-merge",
+            "",
+            "scans",
+        ),
         _SEPARATOR,
+        *_inside("Length unit", *(_unit(unit) for unit in LengthUnit)),
     ),
     "Detect": (
         _A(

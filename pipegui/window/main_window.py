@@ -16,6 +16,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QMainWindow, QStackedWidget, QToolTip, QVBoxLayout, QWidget
 
+from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
 from pipegui.i18n.texts import inside, tr
 from pipegui.model.document import Background, Tool
@@ -111,6 +112,9 @@ class MainWindow(QMainWindow):
         check("coordinates", state.view.tool is Tool.COORDINATES)
         for background in Background:
             check(f"background_{background.name.lower()}", background is state.view.background)
+        for unit in LengthUnit:
+            is_read_in = state.scan is not None and state.scan.reading.length_unit is unit
+            check(f"unit_{unit}", is_read_in)
 
     def apply_properties(self, state: PropertiesState) -> None:
         """Show the properties of what is selected, and head the plots with its name."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject, Signal
 
 from pipecore.errors import ReadError
-from pipecore.settings import Settings
+from pipecore.settings import InputSettings, Settings
 from pipecore.types import PointCloud, Result
 from pipegui.i18n.texts import tr
 from pipegui.model.document import Scan
@@ -33,18 +33,17 @@ from pipegui.work.worker import (
 if TYPE_CHECKING:
     from pipecore.preview import Plan
 
-ReadFunction = Callable[[Path, Settings, JobProgress], PointCloud]
+ReadFunction = Callable[[tuple[Path, ...], InputSettings, JobProgress], PointCloud]
 DetectFunction = Callable[[PointCloud, Settings, JobProgress], Result]
 PlanFunction = Callable[[PointCloud, Settings, JobProgress], "Plan | None"]
 
 
-def read_file(path: Path, settings: Settings, progress: JobProgress) -> PointCloud:
-    """Read a scan with pipecore."""
+def read_files(paths: tuple[Path, ...], given: InputSettings, progress: JobProgress) -> PointCloud:
+    """Read one cloud from one or several files with pipecore."""
     from pipecore.io import read  # noqa: PLC0415 - laspy and numba take their time
 
-    given = settings.input
     return read(
-        path,
+        paths,
         length_unit=given.length_unit,
         flagged_points=given.flagged_points,
         stations=given.stations,
@@ -89,7 +88,8 @@ class _Request:
     """"" for idle work."""
     work: Callable[[JobProgress], Any]
     done: Callable[[Any], None]
-    failed: Callable[[str], None] | None = None
+    failed: Callable[[str, str], None] | None = None
+    """Takes the message of an error and its details, in place of the queue's own signal."""
     is_reading: bool = False
 
     @property
@@ -121,6 +121,10 @@ class JobQueue(QObject):
 
     scan_read = Signal(object)
     """A `Scan`."""
+    scan_read_again = Signal(object, object)
+    """The clouds that it takes the place of, and the `Scan`."""
+    read_failed = Signal(object, str, str)
+    """Paths of the files that could not be read, message, and details for a bug report."""
     detected = Signal(object, object)
     """The cloud and its `Result`."""
     edited = Signal(object)
@@ -130,7 +134,7 @@ class JobQueue(QObject):
 
     def __init__(
         self,
-        read: ReadFunction = read_file,
+        read: ReadFunction = read_files,
         detect: DetectFunction = detect_pipes,
         plan: PlanFunction = plan_cuts,
         parent: QObject | None = None,
@@ -162,22 +166,44 @@ class JobQueue(QObject):
             return self._running.title
         return self._waiting[0].title if self._waiting else ""
 
-    def open_files(self, paths: Sequence[Path], settings: Settings) -> None:
+    def open_files(self, paths: Sequence[Path], reading: InputSettings) -> None:
         """Read each file as a scan of its own, without waiting for a detection."""
+        for path in paths:
+            self._read((path,), path.name, reading, self.scan_read.emit)
+
+    def read_again(
+        self,
+        clouds: Sequence[PointCloud],
+        paths: tuple[Path, ...],
+        name: str,
+        reading: InputSettings,
+    ) -> None:
+        """Read files as one scan that takes the place of those with these clouds."""
+        clouds = tuple(clouds)
+        self._read(paths, name, reading, lambda scan: self.scan_read_again.emit(clouds, scan))
+
+    def _read(
+        self,
+        paths: tuple[Path, ...],
+        name: str,
+        reading: InputSettings,
+        done: Callable[[Scan], None],
+    ) -> None:
         can_wait = self._running is None or self._running.is_reading
         queue = self if can_wait else self._parallel_queue()
-        for path in paths:
 
-            def work(progress: JobProgress, path: Path = path) -> Scan:
-                fingerprint = Fingerprint.if_there(path)
-                cloud = self.read(path, settings, progress)
-                if not len(cloud):
-                    raise ReadError(tr("“{name}” holds no points.").format(name=path.name))
-                unit = settings.input.length_unit
-                return Scan(path.name, cloud, length_unit=unit, fingerprint=fingerprint)
+        def work(progress: JobProgress) -> Scan:
+            fingerprint = Fingerprint.if_there(paths[0])
+            cloud = self.read(paths, reading, progress)
+            if not len(cloud):
+                raise ReadError(tr("“{name}” holds no points.").format(name=name))
+            return Scan(name, cloud, reading=reading, fingerprint=fingerprint, others=paths[1:])
 
-            title = tr("Reading {name}").format(name=path.name)
-            queue._request(_Request(title, work, self.scan_read.emit, is_reading=True))
+        def failed(message: str, details: str) -> None:
+            self.read_failed.emit(paths, message, details)
+
+        title = tr("Reading {name}").format(name=name)
+        queue._request(_Request(title, work, done, failed, is_reading=True))
 
     def _parallel_queue(self) -> "JobQueue":
         if self._running is not None and self._running.is_idle_work:
@@ -235,7 +261,7 @@ class JobQueue(QObject):
         done, failed : callable
             Take its value, or the message of its error.
         """
-        self._idle_work = _Request("", work, done, failed)
+        self._idle_work = _Request("", work, done, lambda message, _: failed(message))
         if self._running is None:
             self._next()
         elif self._running.is_idle_work:
@@ -299,7 +325,8 @@ class JobQueue(QObject):
                 case Finished():
                     request.done(event.value)
                 case Failed():
-                    self.failed.emit(event.message, event.details)
+                    failed = request.failed or self.failed.emit
+                    failed(event.message, event.details)
                 case Cancelled():
                     self.cancelled.emit(request.title)
         # What was done may have requested more.
@@ -311,4 +338,4 @@ def _end_idle_work(request: _Request, event: Finished | Failed | Cancelled) -> N
     if isinstance(event, Finished):
         request.done(event.value)
     elif isinstance(event, Failed) and request.failed is not None:
-        request.failed(event.message)
+        request.failed(event.message, event.details)

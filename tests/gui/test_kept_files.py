@@ -26,7 +26,12 @@ def document():
     saved = read_project(KEPT / "two-scans.pipegui")
     assert [state for _, state in saved.located()] == [CloudState.FOUND] * 2
     clouds = [read(path) for path, _ in saved.located()]
-    return saved.document(tuple(s.with_cloud(c) for s, c in zip(saved.scans, clouds, strict=True)))
+    return saved.document(
+        tuple(
+            s.with_cloud(c, s.cloud.how_read(saved.settings))
+            for s, c in zip(saved.scans, clouds, strict=True)
+        )
+    )
 
 
 def test_that_results_and_edits_are_in_the_project(document):

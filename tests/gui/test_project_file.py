@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from pipecore.errors import CancelledError, WriteError
 from pipecore.io import read, write_laz
-from pipecore.settings import LengthUnit, Settings
+from pipecore.settings import InputSettings, LengthUnit, Settings
 from pipecore.types import Profiles, Result, Review, ReviewState
 from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
 from pipegui.project import project_file
@@ -78,7 +78,7 @@ def same(a, b) -> bool:
 
 def reopened(saved) -> Document:
     scans = [
-        s.with_cloud(read(path, length_unit=s.cloud.length_unit))
+        s.with_cloud(read(path), s.cloud.how_read(saved.settings))
         for s, (path, _) in zip(saved.scans, saved.located(), strict=True)
     ]
     return saved.document(tuple(scans))
@@ -196,10 +196,10 @@ def test_that_another_cloud_is_not_taken_for_the_scan(document, tmp_path):
     write_project(path, document)
     saved = read_project(path).scans[0]
     with pytest.raises(ProjectError, match="another scan"):
-        saved.with_cloud(make_scan(N + 1)[0])
+        saved.with_cloud(make_scan(N + 1)[0], InputSettings())
     cloud = replace(make_scan(N)[0], origin=np.array([1.0, 2.0, 3.0]))
     with pytest.raises(ProjectError, match="elsewhere"):
-        saved.with_cloud(cloud)
+        saved.with_cloud(cloud, InputSettings())
 
 
 def test_that_a_cloud_without_a_file_cannot_be_saved(stored, tmp_path):
@@ -211,8 +211,9 @@ def test_that_a_cloud_without_a_file_cannot_be_saved(stored, tmp_path):
 
 def test_that_the_unit_of_the_file_is_kept(stored, tmp_path):
     path = tmp_path / "work.pipegui"
-    write_project(path, Document((replace(stored, length_unit=LengthUnit.FOOT),)))
-    assert read_project(path).scans[0].cloud.length_unit is LengthUnit.FOOT
+    reading = InputSettings(length_unit=LengthUnit.FOOT, columns="x,y,z,-")
+    write_project(path, Document((replace(stored, reading=reading),)))
+    assert read_project(path).scans[0].cloud.how_read(Settings()) == reading
 
 
 # Whole or not at all; damaged and foreign files

@@ -16,7 +16,7 @@ from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Dent, Run, Straight
 from pipegui.model.document import Selection
 from pipegui.window.views import make_views
-from pipegui.work.job_queue import detect_pipes, read_file
+from pipegui.work.job_queue import detect_pipes, read_files
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 LEFT = Qt.MouseButton.LeftButton
@@ -51,7 +51,7 @@ def test_that_a_scan_becomes_a_reviewed_report_over_two_sessions(
     make_app, qtbot, laz, tmp_path, monkeypatch
 ):
     def opened():
-        app = make_app(read=read_file, detect=detect_pipes, views=make_views())
+        app = make_app(read=read_files, detect=detect_pipes, views=make_views())
         app.window.actions_["fly"].setChecked(False)
         return app
 
@@ -163,7 +163,7 @@ def test_that_work_outlives_a_process_that_was_killed(make_app, qtbot, tmp_path)
         check=False,
     )
     assert killed.returncode == -9, killed.stderr
-    app = make_app(read=read_file, copies=folder)
+    app = make_app(read=read_files, copies=folder)
     app.controllers.autosave.offer_recovery()
     restore, _ = app.window.panels.message.answer_buttons
     qtbot.mouseClick(restore, LEFT)

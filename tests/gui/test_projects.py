@@ -35,7 +35,7 @@ def laz(tmp_path) -> Path:
 
 
 def read_file(path, settings, progress):
-    return read(path, length_unit=settings.input.length_unit, progress=progress)
+    return read(path, length_unit=settings.length_unit, progress=progress)
 
 
 def detect(cloud, settings, progress):

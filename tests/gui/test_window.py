@@ -381,7 +381,7 @@ def test_that_the_window_answers_while_it_detects(make_app, qtbot):
 
 def test_that_a_file_that_cannot_be_read_is_told_with_details_to_copy(make_app, qtbot):
     def read(path, settings, progress):
-        raise ReadError(f"“{path.name}” is damaged: it ends after 12 of 100 points.")
+        raise ReadError(f"“{path[0].name}” is damaged: it ends after 12 of 100 points.")
 
     app = make_app(read=read)
     app.controllers.scans.open_files([Path("broken.laz")])
@@ -415,7 +415,7 @@ def test_that_requests_wait_for_each_other(make_app, qtbot):
     order = []
 
     def read(path, settings, progress):
-        order.append(path.name)
+        order.append(path[0].name)
         progress.update("reading", 0.5)
         return make_cloud()
 
@@ -521,11 +521,11 @@ def test_that_opened_files_are_remembered(make_app, qtbot, tmp_path):
 
     path = tmp_path / "plant.laz"
     path.touch()
-    app = make_app(read=lambda p, s, g: replace(make_cloud(), source=p))
+    app = make_app(read=lambda p, s, g: replace(make_cloud(), source=p[0]))
     app.controllers.scans.open_files([path])
     qtbot.waitUntil(lambda: app.session.document.scan is not None and not app.session.jobs.is_busy)
     app.window.close()
-    again = make_app(read=lambda p, s, g: replace(make_cloud(), source=p))
+    again = make_app(read=lambda p, s, g: replace(make_cloud(), source=p[0]))
     recent = again.window.recent_files.actions()
     assert [a.text() for a in recent] == ["plant.laz"]
     recent[0].trigger()

@@ -149,15 +149,19 @@ def sense_notes(
         return (
             Note(
                 "If “{name}” is in {unit}, its points are {spacing:.2g} m apart and spread over "
-                "{extent:.3g} m; if that cannot be, choose another length unit, such as {other}.",
+                "{extent} m; if that cannot be, choose another length unit, such as {other}.",
                 name=path.name,
                 unit=str(unit),
                 spacing=spacing,
-                extent=float(np.max(extent * unit.factors)),
+                extent=_rounded(float(np.max(extent * unit.factors))),
                 other="mm" if spacing > WIDEST_SPACING else "m",
             ),
         )
     return ()
+
+
+def _rounded(metres: float) -> str:
+    return f"{metres:,.0f}" if metres >= 100 else f"{metres:.3g}"
 
 
 def _looks_like_degrees(low: Array, high: Array) -> bool:
