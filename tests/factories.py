@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipecore.deformation import relate_deformations
 from pipecore.geometry import ArcAxis, Array, LineAxis, surface_points
+from pipecore.reasons import Reason
 from pipecore.settings import Settings
 from pipecore.types import (
     OWN_STACK,
@@ -109,7 +110,13 @@ class _Piece:
             nominal=self.nominal,
             not_measurable={}
             if carries_ovality or self.kind is ElementKind.FLANGE
-            else {"ovality": f"{np.rad2deg(self.arc):.0f}° of arc seen, 200° are needed"},
+            else {
+                "ovality": Reason(
+                    "{seen}° of arc seen, {needed}° are needed",
+                    seen=f"{np.rad2deg(self.arc):.0f}",
+                    needed="200",
+                )
+            },
         )
 
 
@@ -237,7 +244,7 @@ def _deformations(pieces: list[_Piece]) -> tuple[Deformation, ...]:
             volume=(0.5 - 2 / np.pi**2) * np.pi / 4 * length * width * depth
             if kind in PATCHES
             else np.nan,
-            not_measurable={"strain": "the wall thickness is not set"}
+            not_measurable={"strain": Reason("the wall thickness is not set")}
             if kind is DeformationKind.DENT
             else {},
         )

@@ -17,6 +17,10 @@ from pipegui.model.fingerprint import Fingerprint
 class Choice(StrEnum):
     """What the user chooses in the window: values are what is shown, files keep the names."""
 
+    @classmethod
+    def _missing_(cls, value: object) -> "Choice | None":
+        return cls.__members__.get(str(value).upper())
+
 
 class ColourBy(Choice):
     """What points are coloured by."""
@@ -43,9 +47,9 @@ class Background(Choice):
     BLACK = "Black"
 
     @classmethod
-    def _missing_(cls, value: object) -> "Background | None":
+    def _missing_(cls, value: object) -> Choice | None:
         # As projects of version 0.1 have it.
-        return cls.SYSTEM if value == "As the system" else None
+        return cls.SYSTEM if value == "As the system" else super()._missing_(value)
 
 
 class Tool(Choice):

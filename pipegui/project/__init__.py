@@ -1,1 +1,1 @@
-"""The project file: format, codec, reference to the clouds."""
+"""The project file: its format, and references to the clouds."""

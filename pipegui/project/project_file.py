@@ -1,59 +1,44 @@
 """Project files: all of the user's work in one file, the clouds by reference.
 
-A project is a zip archive of ``project.json`` and NumPy arrays (``.npy``, never
-pickled): format version 2. ``project.json`` holds what is small, the arrays of scan `i`
-lie in ``scans/i``: ``segment_id``, ``element_id`` and ``deviation`` by point, and the
-columns of the profiles in ``profiles``. A cloud is named by its path, relative to the
-project where that can be, with a fingerprint of what is in it. Keys may be added within
-a version; a reader refuses a larger one. Version 1 named classes of the program, and
-choices of the view by the words shown.
+A project is a zip archive of ``project.json`` and the results of its scans, which
+`pipecore.report.project` describes, writes and reads. A cloud is named by its path, relative
+to the project where that can be, with a fingerprint of what is in it. Version 1 named
+classes of the program, and choices of the view by the words shown.
 """
 
 import json
 import os
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import pipecore
-from pipecore.consistency import check_result
-from pipecore.errors import PipecoreError
+from pipecore.errors import PipecoreError, ReadError
 from pipecore.io import write_file
+from pipecore.json_codec import from_plain, to_plain
 from pipecore.progress import NoProgress, Progress
+from pipecore.report.project import (
+    CONTENTS,
+    FORMAT,
+    FORMAT_VERSION,
+    read_contents,
+    read_scan,
+    scan_to_dict,
+    write_scan_arrays,
+)
 from pipecore.settings import InputSettings, Settings
-from pipecore.types import Deformation, Element, Profiles, Result, Review, Stack
-from pipegui.i18n.texts import tr
-from pipegui.model.document import Document, Scan, Selection, ViewOptions
+from pipecore.types import Result, Review
+from pipegui.i18n.texts import error_text, tr
+from pipegui.model.document import Choice, Document, Scan, Selection, ViewOptions
 from pipegui.model.fingerprint import Fingerprint
 from pipegui.project.cloud_reference import CloudReference, CloudState
-from pipegui.project.json_codec import from_plain, to_plain
 
 SUFFIX = ".pipegui"
-FORMAT = "pipegui project"
-FORMAT_VERSION = 2
-CONTENTS = "project.json"
-POINT_ARRAYS = {"segment_id": np.int32, "element_id": np.int32, "deviation": np.float32}
-IN_PROFILES = {f.name for f in fields(Profiles)}
-IN_JSON: dict[str, Any] = {
-    "source": Path | None,
-    "n_cloud_points": int,
-    "stacks": tuple[Stack, ...],
-    "elements": tuple[Element, ...],
-    "deformations": tuple[Deformation, ...],
-    "seconds": dict[str, float],
-    "edits": tuple[str, ...],
-    "run_names": dict[int, str],
-    "own_settings": dict[int, Settings],
-    "settings": Settings,
-    "origin": NDArray[np.float64],
-}
-"""What of a result is kept as JSON, with its kinds."""
 
 Camera = Mapping[str, list[float]]
 
@@ -91,7 +76,10 @@ class SavedScan:
                     n_points=self.cloud.n_points,
                 )
             )
-        result = self.result and replace(self.result, source=cloud.source)
+        # Projects of the first versions kept neither unit nor notes.
+        result = self.result and replace(
+            self.result, source=cloud.source, unit=cloud.unit, notes=cloud.notes
+        )
         if result is not None and not np.allclose(result.origin, cloud.origin, rtol=0, atol=1e-6):
             raise ProjectError(
                 tr(
@@ -193,7 +181,7 @@ def write_project(
         "active": document.active,
         "settings": to_plain(document.settings),
         "selection": to_plain(document.selection),
-        "view": to_plain(document.view),
+        "view": _view_to_plain(document.view),
         "camera": to_plain(dict(camera or {})),
         "scans": scans,
     }
@@ -202,21 +190,16 @@ def write_project(
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
     ):
         archive.writestr(CONTENTS, json.dumps(contents, allow_nan=False, ensure_ascii=False))
-        arrays = list(_arrays(document))
-        for i, (name, array) in enumerate(arrays):
-            progress.update("saving", i / len(arrays))
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
-                _write_array(file, array, progress, i / len(arrays))
+        for i, scan in enumerate(document.scans):
+            if scan.result is not None:
+                write_scan_arrays(archive, i, scan.result, progress)
 
 
-def _write_array(file: Any, array: NDArray[Any], progress: Progress, done: float) -> None:
-    array = np.ascontiguousarray(array)
-    header = np.lib.format.header_data_from_array_1_0(array)
-    np.lib.format.write_array_header_1_0(file, header)
-    data = array.reshape(-1).view(np.uint8)
-    for start in range(0, len(data), 1 << 22):
-        progress.update("saving", done)
-        file.write(data[start : start + (1 << 22)].data)
+def _view_to_plain(view: ViewOptions) -> dict[str, Any]:
+    """The view with the names of what was chosen: the words shown may change."""
+    values = {f.name: getattr(view, f.name) for f in fields(view)}
+    names = {k: v.name.lower() for k, v in values.items() if isinstance(v, Choice)}
+    return {name: to_plain(value) for name, value in values.items()} | names
 
 
 def _scan_to_plain(scan: Scan, folder: Path) -> dict[str, Any]:
@@ -228,18 +211,8 @@ def _scan_to_plain(scan: Scan, folder: Path) -> dict[str, Any]:
         "result": None,
     }
     if result is not None:
-        plain["result"] = {name: to_plain(getattr(result, name)) for name in IN_JSON}
+        plain["result"] = scan_to_dict(result)
     return plain
-
-
-def _arrays(document: Document) -> Iterator[tuple[str, NDArray[Any]]]:
-    for i, scan in enumerate(document.scans):
-        if scan.result is None:
-            continue
-        for name in POINT_ARRAYS:
-            yield f"scans/{i}/{name}", getattr(scan.result, name)
-        for f in fields(Profiles):
-            yield f"scans/{i}/profiles/{f.name}", getattr(scan.result.profiles, f.name)
 
 
 # Reading
@@ -270,6 +243,8 @@ def read_project(path: Path, progress: Progress | None = None) -> SavedProject:
     try:
         with zipfile.ZipFile(path) as archive:
             return _read(Path(os.path.realpath(path)), archive, progress)
+    except ReadError as error:
+        raise ProjectError(error_text(error)) from error
     except PipecoreError:
         raise
     except FileNotFoundError as error:
@@ -289,18 +264,7 @@ def read_project(path: Path, progress: Progress | None = None) -> SavedProject:
 
 
 def _read(path: Path, archive: zipfile.ZipFile, progress: Progress) -> SavedProject:
-    contents = json.loads(archive.read(CONTENTS))
-    if not isinstance(contents, dict) or contents.get("format") != FORMAT:
-        raise ValueError("it says that it is something else")
-    version = contents.get("format_version")
-    if type(version) is not int or version < 1:
-        raise ValueError("it has no version")
-    if version > FORMAT_VERSION:
-        raise ProjectError(
-            tr(
-                "“{name}” was saved by a newer PipeGUI ({program}). Update this program to open it."
-            ).format(name=path.name, program=contents.get("program"))
-        )
+    contents = read_contents(archive)
     plain_scans = contents["scans"]
     scans = []
     for i, plain in enumerate(plain_scans):
@@ -336,70 +300,15 @@ def _scan_from_plain(
     reviews = from_plain(Mapping[int, Review], plain["reviews"])
     result = None
     if plain["result"] is not None:
-        result = _result(plain["result"], reference, number, archive, progress)
+        result = read_scan(archive, number, plain["result"], progress)
+        if result.n_cloud_points != reference.n_points:
+            raise ValueError("the result is of another cloud")
         known = {d.deformation_id for d in result.deformations}
         if not set(reviews) <= known:
             raise ValueError("a review is of a deformation that is not there")
     elif reviews:
         raise ValueError("there are reviews without deformations")
     return SavedScan(from_plain(str, plain["name"]), reference, result, reviews)
-
-
-def _result(
-    plain: Mapping[str, Any],
-    reference: CloudReference,
-    number: int,
-    archive: zipfile.ZipFile,
-    progress: Progress,
-) -> Result:
-    values = {
-        name: from_plain(kind, plain[name]) for name, kind in IN_JSON.items() if name in plain
-    }
-    n_points = values.get("n_cloud_points")
-    if n_points != reference.n_points:
-        raise ValueError("the result is of another cloud")
-    for name, dtype in POINT_ARRAYS.items():
-        progress.update("opening", 0.0)
-        values[name] = _array(archive, f"scans/{number}/{name}", np.dtype(dtype), (n_points,))
-    values["profiles"] = _profiles(archive, number)
-    result = Result(**values)
-    check_result(result)
-    return result
-
-
-def _profiles(archive: zipfile.ZipFile, number: int) -> Profiles:
-    empty, names, columns = Profiles.empty(), set(archive.namelist()), {}
-    for column in sorted(IN_PROFILES):
-        name = f"scans/{number}/profiles/{column}"
-        # A column that came with a later version is left at its default.
-        if f"{name}.npy" in names:
-            model = getattr(empty, column)
-            columns[column] = _array(archive, name, model.dtype, (None, *model.shape[1:]))
-    profiles = Profiles(**columns)
-    if len({len(getattr(profiles, name)) for name in IN_PROFILES}) != 1:
-        raise ValueError("its profiles have columns of different length")
-    return profiles
-
-
-def _array(
-    archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any], shape: tuple[int | None, ...]
-) -> NDArray[Any]:
-    with archive.open(f"{name}.npy") as file:
-        if np.lib.format.read_magic(file) != (1, 0):
-            raise ValueError(f"{name} is of an unknown kind")
-        found, is_fortran, stored = np.lib.format.read_array_header_1_0(file)
-        fits = len(found) == len(shape) and all(
-            want in (None, have) for want, have in zip(shape, found, strict=True)
-        )
-        n_bytes = int(np.prod(found, dtype=object)) * dtype.itemsize
-        # Checked before anything of that size is asked of the memory.
-        n_stored = archive.getinfo(f"{name}.npy").file_size
-        if stored != dtype or is_fortran or not fits or n_bytes > n_stored:
-            raise ValueError(f"{name} has another shape")
-        data = file.read(n_bytes)
-        if len(data) != n_bytes or file.read(1):
-            raise ValueError(f"{name} is cut short")
-    return np.frombuffer(bytearray(data), dtype).reshape(found)
 
 
 def _check_selection(selection: Selection, view: ViewOptions, result: Result | None) -> None:

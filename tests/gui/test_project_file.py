@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from pipecore.errors import CancelledError, WriteError
 from pipecore.io import read, write_laz
+from pipecore.json_codec import from_plain, to_plain
 from pipecore.settings import InputSettings, LengthUnit, Settings
 from pipecore.types import Profiles, Result, Review, ReviewState
 from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
 from pipegui.project import project_file
 from pipegui.project.cloud_reference import CloudState
-from pipegui.project.json_codec import from_plain, to_plain
 from pipegui.project.project_file import ProjectError, read_project, work_of, write_project
 from tests.factories import make_scan
 

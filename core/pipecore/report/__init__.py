@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from pipecore.io import write_directory, write_file, write_laz
 from pipecore.progress import NoProgress, Progress
-from pipecore.report.reading import load, result_from_dict
+from pipecore.report.loading import load
+from pipecore.report.reading import result_from_dict
 from pipecore.report.result_json import result_to_dict, write_result_json
 from pipecore.report.summary import by_verdict, summarise
 from pipecore.report.tables import (

@@ -1,59 +1,43 @@
 """Reading a report folder back: the inverse of `write_report`."""
 
 import dataclasses
-import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import orjson
 from numpy.typing import NDArray
 
 from pipecore.consistency import check_result
-from pipecore.errors import PipecoreError, ReadError
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.errors import ReadError
+from pipecore.json_codec import from_plain
 from pipecore.notes import Note
-from pipecore.progress import NoProgress, Progress
+from pipecore.progress import Progress
 from pipecore.reasons import Reason
 from pipecore.report.result_json import FORMAT, FORMAT_VERSION
 from pipecore.settings import Settings
-from pipecore.types import (
-    Deformation,
-    DeformationKind,
-    Element,
-    ElementKind,
-    NominalSize,
-    Profiles,
-    Result,
-    Stack,
-    Verdict,
-)
+from pipecore.types import Array, Deformation, Element, Profiles, Result, Stack
 from pipecore.units import FileUnit
 
-AXES = {"line": LineAxis, "arc": ArcAxis}
 POINT_COLUMNS = {"segment_id": np.int32, "element_id": np.int32, "deviation_mm": np.float32}
 """What ``segments.laz`` holds of each point, and as what a result does."""
 
 POINTS_AT_A_TIME = 1_000_000
 
 
-def load(folder: str | os.PathLike[str], *, progress: Progress | None = None) -> Result:
+def load_folder(folder: Path, progress: Progress) -> Result:
     """Read a result from a report folder.
 
     Parameters
     ----------
-    folder : path
-        As `write_report`, `Result.save` or ``pipecore detect`` made it; needed are
-        ``result.json`` and, for what belongs to each point, ``segments.laz``.
-    progress : Progress, optional
+    folder : Path
+    progress : Progress
         Receives updates of the stage "reading"; may cancel.
 
     Returns
     -------
     Result
-        Equal to the one that was written; numbers of profiles to the nanometre, deviations
-        of points to float32. Without ``segments.laz`` its arrays by point are empty.
 
     Raises
     ------
@@ -62,7 +46,6 @@ def load(folder: str | os.PathLike[str], *, progress: Progress | None = None) ->
     CancelledError
         From `progress`.
     """
-    folder, progress = Path(folder), progress or NoProgress()
     progress.update("reading", 0.0)
     path = folder / "result.json"
     try:
@@ -133,31 +116,29 @@ def result_from_dict(plain: Mapping[str, Any]) -> Result:
     ValueError, KeyError, TypeError
         If it is none.
     """
-    try:
-        settings = Settings.from_dict(plain["settings"])
-        own_settings = {
-            int(i): Settings.from_dict(s) for i, s in plain.get("own_settings", {}).items()
-        }
-    except PipecoreError as error:
-        raise ValueError(str(error)) from error
+    templates = plain.get("templates", {})
+    elements, deformations = (
+        [_with_templates(item, templates) for item in plain[name]]
+        for name in ("elements", "deformations")
+    )
     return Result(
-        settings=settings,
-        origin=_vector(plain["origin"]),
-        source=Path(plain["source"]) if plain["source"] else None,
-        n_cloud_points=int(plain["n_cloud_points"]),
-        stacks=tuple(_made(Stack, s, direction=_vector) for s in plain["stacks"]),
-        elements=tuple(_element(e) for e in plain["elements"]),
+        settings=from_plain(Settings, plain["settings"]),
+        origin=from_plain(Array, plain["origin"]),
+        source=from_plain(Path | None, plain["source"]),
+        n_cloud_points=from_plain(int, plain["n_cloud_points"]),
+        stacks=from_plain(tuple[Stack, ...], plain["stacks"]),
+        elements=from_plain(tuple[Element, ...], elements),
         profiles=_profiles(plain["profiles"]),
-        deformations=tuple(_deformation(d) for d in plain["deformations"]),
+        deformations=from_plain(tuple[Deformation, ...], deformations),
         segment_id=np.empty(0, np.int32),
         element_id=np.empty(0, np.int32),
         deviation=np.empty(0, np.float32),
-        seconds={str(step): float(s) for step, s in plain["seconds"].items()},
-        edits=tuple(plain.get("edits", ())),
-        run_names={int(i): str(name) for i, name in plain.get("run_names", {}).items()},
-        own_settings=own_settings,
+        seconds=from_plain(dict[str, float], plain["seconds"]),
+        edits=from_plain(tuple[str, ...], plain.get("edits", [])),
+        run_names=from_plain(dict[int, str], plain.get("run_names", {})),
+        own_settings=from_plain(dict[int, Settings], plain.get("own_settings", {})),
         unit=_unit(plain),
-        notes=tuple(Note(str(note)) for note in plain.get("notes", ())),
+        notes=tuple(_note(templates.get(note, note)) for note in plain.get("notes", [])),
     )
 
 
@@ -172,60 +153,15 @@ def _unit(plain: Mapping[str, Any]) -> FileUnit:
     )
 
 
-Noun = TypeVar("Noun")
+def _with_templates(plain: Mapping[str, Any], templates: Mapping[str, Any]) -> dict[str, Any]:
+    """An element or a deformation whose reasons have their templates again."""
+    reasons = plain.get("not_measurable", {})
+    return {**plain, "not_measurable": {k: templates.get(w, w) for k, w in reasons.items()}}
 
 
-def _made(
-    kind: Callable[..., Noun], plain: Mapping[str, Any], /, **read: Callable[[Any], Any]
-) -> Noun:
-    """Make a noun of the pipeline; `read` says how to read what is not a number or text."""
-    values = {}
-    for f in dataclasses.fields(kind):  # type: ignore[arg-type]
-        if f.name in plain:
-            value = plain[f.name]
-            if f.name in read:
-                values[f.name] = read[f.name](value)
-            else:
-                values[f.name] = np.nan if value is None else value
-    return kind(**values)
-
-
-def _element(plain: Mapping[str, Any]) -> Element:
-    return _made(
-        Element,
-        plain,
-        kind=ElementKind,
-        axis=_axis,
-        centre=_vector,
-        nominal=lambda size: size and _made(NominalSize, size),
-        gaps=lambda gaps: tuple((float(start), float(end)) for start, end in gaps),
-        not_measurable=_reasons,
-    )
-
-
-def _deformation(plain: Mapping[str, Any]) -> Deformation:
-    return _made(
-        Deformation,
-        plain,
-        kind=DeformationKind,
-        verdict=Verdict,
-        peak=_vector,
-        not_measurable=_reasons,
-    )
-
-
-def _axis(plain: Mapping[str, Any]) -> LineAxis | ArcAxis:
-    kind: Callable[..., LineAxis | ArcAxis] = AXES[plain["kind"]]
-    vectors = ("start", "direction", "centre", "normal", "towards_start")
-    return _made(kind, plain, **dict.fromkeys(vectors, _vector))
-
-
-def _vector(plain: Any) -> NDArray[np.float64]:
-    return np.array(plain, np.float64)  # None becomes nan
-
-
-def _reasons(plain: Mapping[str, str]) -> dict[str, Reason]:
-    return {str(name): Reason(why) for name, why in plain.items()}
+def _note(plain: Any) -> Note:
+    reason: Reason = from_plain(Reason, plain)
+    return Note(reason.template, **reason.values)
 
 
 def _profiles(plain: Mapping[str, Any]) -> Profiles:

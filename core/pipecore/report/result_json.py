@@ -6,8 +6,10 @@ coordinates in metres, and world coordinates in the file's unit are
 A kind of axis has its own keys: ``line`` has start, direction and length, ``arc`` has
 centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
 length, with nine digits after the point. ``settings`` are those of the detection,
-``own_settings`` those of elements that were detected again with others, by element id. A
-reader refuses a larger `format_version`; keys may be added within a version.
+``own_settings`` those of elements that were detected again with others, by element id.
+``templates`` gives the sentences of ``notes`` and ``not_measurable`` that have values in
+them as template and values, so that they can be said in another language. A reader refuses
+a larger `format_version`; keys may be added within a version.
 """
 
 import dataclasses
@@ -22,7 +24,7 @@ import numpy as np
 import orjson
 
 import pipecore
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.json_codec import KIND_KEY, KIND_NAMES
 from pipecore.progress import NoProgress, Progress
 from pipecore.types import Result
 
@@ -78,6 +80,18 @@ def _content(result: Result) -> dict[str, Any]:
             for f in dataclasses.fields(result.profiles)
         },
         "deformations": _plain(result.deformations),
+        "templates": _templates(result),
+    }
+
+
+def _templates(result: Result) -> dict[str, Any]:
+    """Templates and values of the sentences in a result, by the sentences."""
+    found = (result.elements, result.deformations)
+    reasons = [why for items in found for item in items for why in item.not_measurable.values()]
+    return {
+        str(sentence): {"template": sentence.template, "values": _plain(sentence.values)}
+        for sentence in [*result.notes, *reasons]
+        if sentence.values
     }
 
 
@@ -113,7 +127,8 @@ def _plain(value: Any) -> Any:
     """Turn the nouns of the pipeline into what JSON knows."""
     if dataclasses.is_dataclass(value):
         plain = {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
-        return _AXIS_KIND.get(type(value), {}) | plain
+        kind = KIND_NAMES.get(type(value))
+        return plain if kind is None else {KIND_KEY: kind} | plain
     if isinstance(value, np.ndarray | np.generic):
         plain_numbers = np.asarray(value).astype(object)
         plain_numbers[~np.isfinite(value)] = None
@@ -125,6 +140,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, StrEnum) else value
-
-
-_AXIS_KIND: dict[type, dict[str, Any]] = {LineAxis: {"kind": "line"}, ArcAxis: {"kind": "arc"}}

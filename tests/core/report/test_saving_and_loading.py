@@ -5,6 +5,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
@@ -16,9 +17,12 @@ import pytest
 import pipecore
 from pipecore import Table
 from pipecore.errors import CancelledError, ReadError, WriteError
+from pipecore.notes import Note
+from pipecore.reasons import Reason
 from pipecore.report import deformations_table, result_from_dict, result_to_dict
 from pipecore.settings import Settings
 from pipecore.types import NominalSize, Profiles, Result, Review, ReviewState
+from pipecore.units import FileUnit
 from tests.factories import make_scan
 
 N_POINTS = 2000
@@ -27,15 +31,23 @@ NANOMETRE = 1e-9
 
 @pytest.fixture(scope="module")
 def edited() -> Result:
-    """A result with all that only some results have."""
+    """A result with all that only some results have, of a file in feet that notes are on."""
     result = make_scan(N_POINTS)[1]
-    gappy = replace(result.elements[1], gaps=((0.2, 0.35),), name="=Feed, “north”")
+    short_arc = Reason("{seen}° of arc seen, {needed}° are needed", seen="120", needed="200")
+    gappy = replace(
+        result.elements[1],
+        gaps=((0.2, 0.35),),
+        name="=Feed, “north”",
+        not_measurable={"ovality": short_arc},
+    )
     return replace(
         result,
         elements=(result.elements[0], gappy, *result.elements[2:]),
         edits=("pipes 3 and 4 merged",),
         run_names={2: "Return"},
         own_settings={4: Settings().replace({"stacks.width_mm": 12})},
+        unit=FileUnit("us-ft", 1200 / 3937, "m", 1.0),
+        notes=(Note("“{name}” has {n:,} points.", name="a.las", n=2000), Note("It is {old}.")),
     )
 
 
@@ -62,6 +74,11 @@ def assert_equal(a: Any, b: Any, what: str = "result") -> None:
     else:
         assert a == b, what
         assert type(a) is type(b) or isinstance(a, dict), what
+    if isinstance(a, dict):
+        for key in a:
+            assert_equal(a[key], b[key], f"{what}[{key}]")
+    if isinstance(a, Reason):
+        assert (a.template, a.values) == (b.template, b.values), what
 
 
 def test_that_a_saved_result_loads_as_it_was(edited: Result, saved: Path) -> None:
@@ -114,7 +131,7 @@ def test_that_an_empty_result_loads(tmp_path: Path) -> None:
 
 def test_that_what_an_older_program_did_not_write_keeps_its_default(edited: Result) -> None:
     plain = result_to_dict(edited)
-    for key in ("edits", "run_names", "own_settings"):
+    for key in ("edits", "run_names", "own_settings", "templates", "notes", "length_unit"):
         del plain[key]
     del plain["elements"][0]["name"]
     plain["elements"][0]["colour"] = "of a newer one"
@@ -123,6 +140,45 @@ def test_that_what_an_older_program_did_not_write_keeps_its_default(edited: Resu
     assert (loaded.edits, loaded.run_names, loaded.own_settings) == ((), {}, {})
     assert loaded.elements[0].name == ""
     assert np.isnan(loaded.profiles.curvature_variation).all()
+    assert loaded.notes == ()
+    assert loaded.elements[1].not_measurable == edited.elements[1].not_measurable
+
+
+# Projects of the app
+
+PROJECT = Path(__file__).parents[2] / "data" / "ac01052" / "two-scans.pipegui"
+
+
+def test_that_a_project_loads_by_the_name_of_a_scan() -> None:
+    riser = pipecore.load(PROJECT, "riser.laz")
+    pump_house = pipecore.load(PROJECT, "pump-house.laz")
+    assert (len(riser.elements), len(pump_house.elements)) == (2, 5)
+    assert pump_house.run_names == {1: "Line 7"}
+    assert len(riser.element_id) == riser.n_cloud_points == 5141
+    assert len(pump_house.profiles.of_element(1, 0)) == 47
+
+
+@pytest.mark.parametrize("scan", [None, "third.laz"])
+def test_that_a_project_without_one_such_scan_says_what_it_holds(scan: str | None) -> None:
+    with pytest.raises(ReadError, match=f"results of {0 if scan else 2} scans.*name one"):
+        pipecore.load(PROJECT, scan)
+
+
+def test_that_what_is_no_project_is_refused_in_words(tmp_path: Path) -> None:
+    path = tmp_path / "work.pipegui"
+    for content in (b"", b"PK", PROJECT.read_bytes()[:-30], PROJECT.read_bytes()[100:]):
+        path.write_bytes(content)
+        with pytest.raises(ReadError, match=r"“.*work\.pipegui” (is damaged|cannot be read)"):
+            pipecore.load(path, "riser.laz")
+
+
+def test_that_a_project_of_a_newer_program_is_named_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "newer.pipegui"
+    with zipfile.ZipFile(path, "w") as archive:
+        contents = {"format": "pipegui project", "format_version": 3, "program": "9.9"}
+        archive.writestr("project.json", json.dumps(contents))
+    with pytest.raises(ReadError, match=r"“newer\.pipegui” was saved by a newer PipeGUI \(9\.9\)"):
+        pipecore.load(path)
 
 
 # What is damaged

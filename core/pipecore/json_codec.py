@@ -1,4 +1,4 @@
-"""Frozen dataclasses to what JSON knows, and back by their type hints.
+"""Frozen dataclasses to what JSON knows, and back by their type hints: results and projects.
 
 Files live longer than a version of the program. Fields that are not in the file keep their
 defaults, unknown fields are ignored, and classes are not named: where several are possible,
@@ -20,7 +20,6 @@ from pipecore.errors import SettingsError
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.reasons import Reason
 from pipecore.settings import Settings
-from pipegui.model.document import Choice
 
 KIND_KEY = "kind"
 KIND_NAMES: dict[type, str] = {LineAxis: "line", ArcAxis: "arc"}
@@ -49,10 +48,6 @@ def to_plain(value: Any) -> Any:  # noqa: PLR0911 - one for each type
         return fields if name is None else {KIND_KEY: name} | fields
     if isinstance(value, np.ndarray | np.generic):
         return to_plain(value.tolist())
-    if isinstance(value, Reason) and value.values:
-        return {"template": value.template, "values": to_plain(value.values)}
-    if isinstance(value, Choice):
-        return value.name.lower()
     if isinstance(value, StrEnum | Path):
         return str(value)
     if isinstance(value, float):
@@ -107,8 +102,6 @@ def from_plain(kind: Any, plain: Any) -> Any:  # noqa: PLR0911 - one for each ty
         return _from_fields(kind, plain)
     if isinstance(kind, type) and issubclass(kind, StrEnum):
         _expect(isinstance(plain, str), kind, plain)
-        if issubclass(kind, Choice) and plain.upper() in kind.__members__:
-            return kind[plain.upper()]
         return kind(plain)
     if kind is Reason:
         return _reason(plain)
