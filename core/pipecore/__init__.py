@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         types,
     )
     from pipecore.errors import CancelledError, PipecoreError, ReadError, SettingsError, WriteError
-    from pipecore.io import info, read
+    from pipecore.io import info, read, write
     from pipecore.pipeline import detect
     from pipecore.report import load, write_report
     from pipecore.settings import Settings
@@ -83,12 +83,13 @@ __all__ = [
     "settings",
     "simulate",
     "types",
+    "write",
     "write_report",
 ]
 
 _NAMES_OF = {
     "errors": ("CancelledError", "PipecoreError", "ReadError", "SettingsError", "WriteError"),
-    "io": ("info", "read"),
+    "io": ("info", "read", "write"),
     "pipeline": ("detect",),
     "report": ("load", "write_report"),
     "settings": ("Settings",),

@@ -44,6 +44,11 @@ class FileUnit:
         """
         return cls(*_known(*plan), *_known(*height))
 
+    def is_of(self, plan: tuple[str, float], height: tuple[str, float]) -> bool:
+        """Return whether units of plan and height, by name and metres, are these."""
+        other = FileUnit.of_lengths(plan, height)
+        return (self.metres, self.height_metres) == (other.metres, other.height_metres)
+
     @property
     def factors(self) -> NDArray[np.float64]:
         """Metres in one unit of x, y and z, shape (3,)."""

@@ -13,7 +13,7 @@ from pipecore.io.mapped import reserve
 from pipecore.io.reading import Corners, corners_of, read
 from pipecore.io.registry import Format, file_filter, formats, identify
 from pipecore.io.summary import FileInfo, StationInfo, info
-from pipecore.io.writing import write_laz
+from pipecore.io.writing import with_fields, write, write_laz
 
 __all__ = [
     "Corners",
@@ -27,6 +27,8 @@ __all__ = [
     "info",
     "read",
     "reserve",
+    "with_fields",
+    "write",
     "write_directory",
     "write_file",
     "write_laz",

@@ -16,6 +16,7 @@ from pipecore.io.screening import Screen, Whereabouts
 from pipecore.io.source import CHUNK_POINTS, Chunk, FieldInfo, Source
 from pipecore.io.spacing import median_spacing
 from pipecore.io.stations import StationTable
+from pipecore.io.storage import common_storage
 from pipecore.local_frame import FLOAT32_REACH, choose_origin
 from pipecore.notes import Note
 from pipecore.settings import StationSource
@@ -69,6 +70,8 @@ class GrowingCloud:
         Where to keep the arrays as files.
     corners : ndarray, optional
         Only points in this box are kept, in the files' coordinates, shape (2, 3).
+    is_exact : bool
+        Whether to keep all digits of coordinates, as float64.
     """
 
     def __init__(
@@ -78,13 +81,16 @@ class GrowingCloud:
         stations: StationSource,
         folder: Path | None = None,
         corners: Array | None = None,
+        *,
+        is_exact: bool = False,
     ) -> None:
+        self._is_exact = is_exact
         self._folder, self._unit, self._system = folder, unit, system
         self._screen = Screen(corners)
         self._whereabouts: Whereabouts | None = None
         self.n_points = 0
         self.origin: Array | None = None
-        self.xyz = self._column("xyz", np.float32, 3)
+        self.xyz = self._column("xyz", np.float64 if is_exact else np.float32, 3)
         self._columns: dict[str, GrowingArray] = {}
         self._fields: dict[str, GrowingArray] = {}
         self._field_infos: dict[str, FieldInfo] = {}
@@ -243,10 +249,11 @@ class GrowingCloud:
             give_final_ids(station.array, ids)
         elif self._folder is not None:
             (self._folder / "station.uint16").unlink()
+        columns: dict[str, Any] = {name: column.array for name, column in self._columns.items()}
         cloud = PointCloud(
             origin=self.origin,
             xyz=self.xyz.array,
-            **{name: column.array for name, column in self._columns.items()},
+            **columns,
             station=None if ids is None else station.array,
             station_names=names,
             stations=positions * self._unit.factors - self.origin,
@@ -260,6 +267,9 @@ class GrowingCloud:
             },
             notes=(*notes, *self._all_notes()),
             source=source,
+            storage=common_storage(
+                [s.storage for _, s in self._files], self._unit, self._crs_from()
+            ),
         )
         assert self._whereabouts is not None
         bounds = self._whereabouts.bounds()
@@ -269,6 +279,11 @@ class GrowingCloud:
             self._files[0][0], cloud, in_file, is_angular=self._system.is_geographic
         )
         return replace(cloud, notes=(*cloud.notes, *odd))
+
+    def _crs_from(self) -> int:
+        """Place of the file whose reference system is that of the cloud."""
+        names = [s.system.name for _, s in self._files]
+        return names.index(self._system.name) if self._system.name in names else 0
 
     def _all_columns(self) -> list[GrowingArray]:
         return [self.xyz, *self._columns.values(), *self._fields.values()]
@@ -303,7 +318,7 @@ class GrowingCloud:
             n_kept += n
         self._files[-1][1].left_out[STRAY] += self.n_points - n_kept
         self.n_points = n_kept
-        if self.xyz.array.dtype == np.float64 and farthest <= FLOAT32_REACH:
+        if not self._is_exact and self.xyz.array.dtype == np.float64 and farthest <= FLOAT32_REACH:
             if self._folder is None:
                 self.xyz.array = self.xyz.array[:n_kept].astype(np.float32)
             else:

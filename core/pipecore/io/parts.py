@@ -19,11 +19,12 @@ from pipecore.io.growing import (
     odd_size_notes,
 )
 from pipecore.io.mapped import MappedFile
-from pipecore.io.reading import common_unit
+from pipecore.io.reading import common_unit, reading_of
 from pipecore.io.registry import identify
 from pipecore.io.screening import has_zeros
 from pipecore.io.source import CHUNK_POINTS, OpenOptions, Source
 from pipecore.io.stations import StationTable
+from pipecore.io.storage import common_storage
 from pipecore.local_frame import FLOAT32_REACH, choose_origin
 from pipecore.notes import Note
 from pipecore.settings import FlaggedPoints, LengthUnit, StationSource
@@ -165,6 +166,8 @@ def plan_parts(
         step=step,
         notes=(*notes, *of_steps, *of_files),
         source=paths[0],
+        storage=common_storage([source.storage for _, _, source in files], unit),
+        reading=reading_of(paths, length_unit, flagged_points, stations, columns, None),
     )
     return PlannedCloud(parts, cloud, stations, files)
 

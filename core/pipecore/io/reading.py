@@ -3,6 +3,7 @@
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from pipecore.io.source import Chunk, OpenOptions, Source
 from pipecore.notes import Note
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import FlaggedPoints, LengthUnit, StationSource
-from pipecore.types import Array, PointCloud
+from pipecore.types import Array, PointCloud, Reading
 from pipecore.units import FileUnit
 
 LOOK_POINTS = 10_000
@@ -64,7 +65,8 @@ def read(
     columns : str
         What the columns of text files hold, such as “x,y,z,-,intensity”; "" to find it out.
     has_fields : bool
-        Whether `cloud.fields` holds all other values that the files have of each point.
+        Whether `cloud.fields` holds all other values that the files have of each point, and
+        coordinates keep all their digits, as float64: what is written again is unchanged.
     box : (2, 3) numbers, optional
         Two opposite corners, in the files' coordinates: only points between them, both
         included. Of COPC only the nodes that touch the box are read.
@@ -101,7 +103,7 @@ def read(
     unit, system, notes = common_unit(files, recognised, options, length_unit)
     sizes = np.array([path.stat().st_size for path in files], dtype=np.float64)
     starts = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
-    cloud = GrowingCloud(unit, system, stations, folder, corners)
+    cloud = GrowingCloud(unit, system, stations, folder, corners, is_exact=has_fields)
     for i, path in enumerate(files):
         with recognised[i].open(path, options) as source:
             before = cloud.n_points
@@ -123,7 +125,27 @@ def read(
             "No point of “{name}” lies in the box that was asked for.", name=files[0].name
         )
     progress.update("reading", 1.0)
-    return cloud.finish(files[0], notes)
+    how = reading_of(files, length_unit, flagged_points, stations, columns, corners)
+    return replace(cloud.finish(files[0], notes), reading=how)
+
+
+def reading_of(
+    paths: Sequence[Path],
+    length_unit: LengthUnit,
+    flagged_points: FlaggedPoints,
+    stations: StationSource,
+    columns: str,
+    box: Array | None,
+) -> Reading:
+    """Return what it takes to read files again; parameters are those of `read`."""
+    arguments = {
+        "length_unit": length_unit,
+        "flagged_points": flagged_points,
+        "stations": stations,
+        "columns": columns,
+        "box": box,
+    }
+    return Reading(tuple(paths), arguments)
 
 
 def no_points(path: Path, left_out: Counter[str]) -> ReadError:

@@ -14,7 +14,7 @@ from pipecore.errors import PipecoreError, ReadError
 from pipecore.io.crs import NO_SYSTEM, ReferenceSystem
 from pipecore.notes import Note
 from pipecore.settings import FlaggedPoints
-from pipecore.types import Array
+from pipecore.types import Array, Storage
 
 CHUNK_POINTS = 250_000
 """Points of one chunk: read in well under half a second in every binary format."""
@@ -137,6 +137,8 @@ class Source:
         What identifies the project that the file is a part of, or "".
     step : float
         Steps of the coordinates as the header says, in the file's unit; 0 if it does not say.
+    storage : Storage, optional
+        How the file keeps coordinates, where it says so.
     field_infos : mapping of str to FieldInfo
         Of fields that are not stored as they are.
     notes : list of Note
@@ -162,6 +164,7 @@ class Source:
     scans: list[ScanInfo] = field(default_factory=list)
     guid: str = ""
     step: float = 0.0
+    storage: Storage | None = None
     field_infos: Mapping[str, FieldInfo] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
     left_out: Counter[str] = field(default_factory=Counter)

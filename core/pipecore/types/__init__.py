@@ -6,7 +6,7 @@ that the scan cannot carry are nan, never a guess.
 """
 
 from pipecore.types.arrays import Array, Floats
-from pipecore.types.cloud import Field, PointCloud
+from pipecore.types.cloud import Field, PointCloud, Reading, Storage
 from pipecore.types.deformation import Deformation, DeformationKind, Review, ReviewState, Verdict
 from pipecore.types.element import KIND_LABELS, Element, ElementKind, NominalSize
 from pipecore.types.ids import NO_ID
@@ -28,9 +28,11 @@ __all__ = [
     "NominalSize",
     "PointCloud",
     "Profiles",
+    "Reading",
     "Result",
     "Review",
     "ReviewState",
     "Stack",
+    "Storage",
     "Verdict",
 ]

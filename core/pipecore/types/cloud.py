@@ -1,7 +1,7 @@
 """Points of one or several scans, with what a file says of each."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +44,44 @@ class Field:
         if self.no_data is not None:
             scaled = np.where(self.values == self.no_data, np.nan, scaled)
         return np.asarray(scaled, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Storage:
+    """How a file keeps coordinates: as whole numbers of steps from an offset.
+
+    Parameters
+    ----------
+    steps, offsets : ndarray
+        Of x, y and z in the file's unit, shape (3,).
+    projection : tuple of (int, bytes)
+        Records of LAS that name its reference system, as they stand, by their numbers.
+    guid : str
+        What identifies the project that the file is a part of, or "".
+    unit : FileUnit, optional
+        Of steps and offsets; None for that of the cloud.
+    """
+
+    steps: Array
+    offsets: Array
+    projection: tuple[tuple[int, bytes], ...] = ()
+    guid: str = ""
+    unit: FileUnit | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """From which files a cloud was read, and how.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+    arguments : mapping of str to object
+        Those of `pipecore.read`.
+    """
+
+    paths: tuple[Path, ...]
+    arguments: Mapping[str, Any]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,6 +127,10 @@ class PointCloud(Summarised):
         What a reader should know of the file: what was left out, its unit, its errors.
     source : Path, optional
         The file it was read from.
+    storage : Storage, optional
+        How its files keep coordinates, where they all do so in the same steps.
+    reading : Reading, optional
+        From which files it was read, and how; see `pipecore.io.with_fields`.
     """
 
     origin: Array
@@ -106,6 +148,8 @@ class PointCloud(Summarised):
     fields: Mapping[str, Field] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
     source: Path | None = None
+    storage: Storage | None = None
+    reading: Reading | None = None
 
     @classmethod
     def from_points(
@@ -189,3 +233,23 @@ class PointCloud(Summarised):
     def world(self, local: Array) -> Array:
         """World coordinates (float64) of local ones, any shape (..., 3)."""
         return np.asarray(local, dtype=np.float64) + self.origin
+
+    def take(self, rows: NDArray[np.bool_] | NDArray[np.integer[Any]] | slice) -> "PointCloud":
+        """Return some of the points, with all their values.
+
+        Parameters
+        ----------
+        rows : ndarray or slice
+            A mask of shape (n,), or places of points.
+
+        Returns
+        -------
+        PointCloud
+            With the same origin and stations. A slice gives views, anything else copies.
+        """
+        held: dict[str, Any] = {
+            name: None if (values := getattr(self, name)) is None else values[rows]
+            for name in ("intensity", "rgb", "classification", "station")
+        }
+        fields = {name: replace(f, values=f.values[rows]) for name, f in self.fields.items()}
+        return replace(self, xyz=self.xyz[rows], fields=fields, reading=None, **held)

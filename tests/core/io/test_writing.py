@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from pipecore import io
-from pipecore.errors import CancelledError, WriteError
+from pipecore.errors import CancelledError
 from pipecore.settings import LengthUnit
 from pipecore.types import PointCloud
 from pipecore.units import FileUnit
@@ -74,11 +74,16 @@ def test_that_a_cloud_without_points_can_be_written(tmp_path: Path) -> None:
     assert len(laspy.read(tmp_path / "a.laz")) == 0
 
 
-def test_that_a_cloud_too_wide_for_las_is_refused_and_nothing_is_left(tmp_path: Path) -> None:
-    xyz = np.array([[0, 0, 0], [3e5, 0, 0]])
-    with pytest.raises(WriteError, match=r"a\.laz.*too wide"):
-        io.write_laz(tmp_path / "a.laz", PointCloud(np.zeros(3), xyz))
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize("width", [3e6, 2e9])
+def test_that_a_cloud_too_wide_for_las_is_written_in_coarser_steps(
+    tmp_path: Path, width: float
+) -> None:
+    xyz = np.array([[0, 0, 0], [width, 0, 0]])
+    (note,) = io.write_laz(tmp_path / "a.laz", PointCloud(np.zeros(3), xyz))
+    step = laspy.read(tmp_path / "a.laz").header.scales[0]
+    assert f"“a.laz” they are rounded to {1000 * step:.3g} mm" in note
+    assert np.abs(laspy.read(tmp_path / "a.laz").xyz - xyz).max() <= step / 2
+    assert width / 2**32 < step <= 10 * width / 2**32
 
 
 def test_that_cancelling_leaves_nothing(tmp_path: Path, points: Points) -> None:

@@ -82,6 +82,10 @@ def assert_read_alike(paths, folder, unit=LengthUnit.METRE):
         if isinstance(wanted, np.ndarray):
             assert value.dtype == wanted.dtype, name
             assert_array_equal(value, wanted, err_msg=name)
+        elif name == "storage" and wanted is not None:
+            assert_array_equal([value.steps, value.offsets], [wanted.steps, wanted.offsets])
+        elif name == "reading":
+            assert (value.paths, value.arguments) == (wanted.paths, wanted.arguments)
         else:
             assert value == wanted, name
 

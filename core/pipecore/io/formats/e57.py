@@ -23,6 +23,7 @@ from pipecore.io.source import (
     damaged,
     raise_read_errors,
 )
+from pipecore.io.storage import KEY, Extras, parse_extras
 from pipecore.notes import Note
 from pipecore.types import Array
 
@@ -30,6 +31,8 @@ _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _INVALID = {_CARTESIAN: "cartesianInvalidState", _SPHERICAL: "sphericalInvalidState"}
 _COLOURS = ("Red", "Green", "Blue")
+_CLASSES, _STATION = f"{KEY}:classification", f"{KEY}:station"
+"""Of files that this program has written; stations are numbered from 1 on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,8 @@ class _Scan:
     position: Array
     """Of the scanner; nan where it is not known."""
     colour_limits: Array
+    kinds: dict[str, np.dtype[Any]]
+    """Of values that are kept as they are: the narrowest that hold what the header allows."""
 
     @property
     def n_points(self) -> int:
@@ -69,20 +74,42 @@ def open_source(path: Path, options: OpenOptions = DEFAULT) -> Iterator[Source]:
             # No scan stores a point in less than a bit.
             if n_points > 8 * path.stat().st_size:
                 raise damaged(path, "E57", f"it cannot hold the {n_points:,} points it announces")
+            extras = _extras(image)
             system = NO_SYSTEM
             if root.isDefined("coordinateMetadata"):
                 system = _in_metres(from_wkt(root["coordinateMetadata"].value()), path, notes)
+            if extras is not None:
+                system = replace(system, name=extras.system.name)
         yield Source(
-            chunks=_chunks(libe57, image, scans, path, options, left_out),
+            chunks=_chunks(libe57, image, scans, path, options, left_out, extras),
             fields=tuple(dict.fromkeys(name for scan in scans for name in scan.fields)),
             n_points=n_points,
             system=system,
-            scans=[ScanInfo(scan.name, scan.position) for scan in scans],
+            scans=_stations(scans, extras),
+            storage=None if extras is None else extras.storage,
+            field_infos=extras.infos() if extras is not None else {},
             notes=notes,
             left_out=left_out,
         )
     finally:
         image.close()
+
+
+def _extras(image: Any) -> Extras | None:
+    """What this program has written besides the points."""
+    # To ask for an extension that the file does not have is an error to libE57.
+    extensions = [image.extensionsPrefix(i) for i in range(image.extensionsCount())]
+    place = f"{KEY}:description"
+    if KEY not in extensions or not image.root().isDefined(place):
+        return None
+    return parse_extras(image.root()[place].value())
+
+
+def _stations(scans: list[_Scan], extras: Extras | None) -> list[ScanInfo]:
+    """The scans, or the stations of points that are all in one scan."""
+    if extras is not None and len(scans) == 1 and _STATION in scans[0].fields:
+        return extras.scans
+    return [ScanInfo(scan.name, scan.position) for scan in scans]
 
 
 def _scans(root: Any, path: Path, notes: list[Note]) -> list[_Scan]:
@@ -145,7 +172,21 @@ def _scan(node: Any, path: Path, name: str) -> _Scan:
         translation,
         translation if is_posed else np.full(3, np.nan),
         np.array([_colour_limits(node, prototype, f"color{c}") for c in _COLOURS]),
+        {name: kind for name in fields if (kind := _kind_of(libe57, prototype[name])) is not None},
     )
+
+
+def _kind_of(libe57: Any, node: Any) -> np.dtype[Any] | None:
+    """The narrowest kind of number that holds what a value may be; None for text."""
+    if isinstance(node, libe57.IntegerNode):
+        low, high = node.minimum(), node.maximum()
+        if low < 0:
+            return np.promote_types(np.min_scalar_type(low), np.min_scalar_type(-high - 1))
+        return np.min_scalar_type(high)
+    if isinstance(node, libe57.FloatNode):
+        is_single = node.precision() == libe57.FloatPrecision.E57_SINGLE
+        return np.dtype(np.float32 if is_single else np.float64)
+    return np.dtype(np.float64) if isinstance(node, libe57.ScaledIntegerNode) else None
 
 
 def _pose(node: Any) -> tuple[Array, Array]:
@@ -183,6 +224,7 @@ def _chunks(
     path: Path,
     options: OpenOptions,
     left_out: Counter[str],
+    extras: Extras | None,
 ) -> Iterator[Chunk]:
     with raise_read_errors(path, "E57"):
         n_total = sum(scan.n_points for scan in scans)
@@ -193,13 +235,16 @@ def _chunks(
                 with np.errstate(over="ignore", invalid="ignore"):
                     chunk = _chunk(scan, values, (n_before + n_read) / n_total)
                 left_out[NO_RETURN] += len(next(iter(values.values()))) - len(chunk)
-                yield replace(chunk, station=number)
+                if extras is not None and chunk.fields:
+                    own = {k.removeprefix(f"{KEY}:"): v for k, v in chunk.fields.items()}
+                    chunk = replace(chunk, fields=extras.joined(own))
+                yield chunk if chunk.station is not None else replace(chunk, station=number)
             n_before += scan.n_points
 
 
 def _wanted(scan: _Scan) -> list[str]:
     """What a cloud has arrays of its own for."""
-    names = [*scan.coordinates, _INVALID[scan.coordinates], "intensity"]
+    names = [*scan.coordinates, _INVALID[scan.coordinates], "intensity", _CLASSES, _STATION]
     names += [f"color{c}" for c in _COLOURS]
     return [name for name in names if name in scan.fields]
 
@@ -219,12 +264,13 @@ def _more_fields(scan: _Scan) -> tuple[str, ...]:
 
 def _values(
     libe57: Any, image: Any, scan: _Scan, more: tuple[str, ...]
-) -> Iterator[tuple[dict[str, NDArray[np.float64]], int]]:
+) -> Iterator[tuple[dict[str, NDArray[Any]], int]]:
     """Yield the wanted values of a scan by their names, and how many are read with them."""
-    names = [*_wanted(scan), *more]
+    wanted = _wanted(scan)
     buffers = libe57.VectorSourceDestBuffer()
     size = min(CHUNK_POINTS, scan.n_points)
-    arrays = {name: np.empty(size) for name in names}
+    arrays = {name: np.empty(size) for name in wanted}
+    arrays |= {name: np.empty(size, _buffer_kind(libe57, scan, name)) for name in more}
     for name, array in arrays.items():
         buffers.append(libe57.SourceDestBuffer(image, name, array, size, True, True))
     reader = scan.points.reader(buffers)
@@ -237,7 +283,13 @@ def _values(
         reader.close()
 
 
-def _chunk(scan: _Scan, values: dict[str, NDArray[np.float64]], fraction: float) -> Chunk:
+def _buffer_kind(libe57: Any, scan: _Scan, name: str) -> type:
+    """As what values that a cloud has no array of its own for are read: whole, or not."""
+    node = libe57.StructureNode(scan.points.prototype())[name]
+    return np.longlong if isinstance(node, libe57.IntegerNode) else np.float64
+
+
+def _chunk(scan: _Scan, values: dict[str, NDArray[Any]], fraction: float) -> Chunk:
     invalid = values.get(_INVALID[scan.coordinates])
     if invalid is not None:
         # 1 means that only the direction is known, 2 not even that.
@@ -256,7 +308,13 @@ def _chunk(scan: _Scan, values: dict[str, NDArray[np.float64]], fraction: float)
         colours = np.stack([values[f"color{c}"] for c in _COLOURS], axis=1)
         shares = np.clip(np.nan_to_num((colours - low) / (high - low)), 0.0, 1.0)
         rgb = np.round(shares * 255).astype(np.uint8)
+    classes = values[_CLASSES].astype(np.uint8) if _CLASSES in values else None
     taken = _wanted(scan)
     # Copies: the buffers are filled anew for the next points.
-    fields = {name: array.copy() for name, array in values.items() if name not in taken}
-    return Chunk(xyz, fraction, intensity, rgb, fields=fields)
+    fields = {
+        name: array.astype(scan.kinds.get(name, array.dtype))
+        for name, array in values.items()
+        if name not in taken
+    }
+    station = values[_STATION].astype(np.int64) - 1 if _STATION in values else None
+    return Chunk(xyz, fraction, intensity, rgb, classes, station, fields)

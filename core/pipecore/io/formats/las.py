@@ -28,7 +28,7 @@ from pipecore.io.source import (
 )
 from pipecore.notes import Note
 from pipecore.settings import FlaggedPoints
-from pipecore.types import Array
+from pipecore.types import Array, Storage
 
 if TYPE_CHECKING:
     import laspy
@@ -40,10 +40,10 @@ OVERVIEW_POINTS = 200_000
 _LOW_NOISE, _HIGH_NOISE = 7, 18
 _WITHHELD_OLD, _WITHHELD_NEW = 0x80, 0x04
 _INT32_MOST = 2**31 - 1
-_HELD_ELSEWHERE = {
-    *("X", "Y", "Z", "intensity", "classification", "red", "green", "blue"),
-}
-"""What a cloud has arrays of its own for."""
+ORIGINAL_INTENSITY = "original_intensity"
+"""Extra value that holds intensities which LAS cannot hold as such: signed or fractions."""
+_HELD_ELSEWHERE = {"X", "Y", "Z", "intensity", "classification", ORIGINAL_INTENSITY}
+"""What a cloud has arrays of its own for. Colours have 16 bits, of which it keeps 8."""
 
 
 @contextmanager
@@ -75,6 +75,7 @@ def open_source(
             system=reader.head.system,
             guid=str(header.uuid),
             step=step if np.isfinite(step) else 0.0,
+            storage=_storage(reader.head),
             field_infos=_field_infos(header.point_format, reader.head.no_data),
             notes=reader.notes,
             left_out=reader.left_out,
@@ -146,6 +147,8 @@ class _Reader:
         chosen = wanted.all() if options.has_fields else selection[0]
         for part in () if options.has_fields else selection[1:]:
             chosen |= part
+        if _has_original_intensity(header.point_format):
+            chosen |= wanted.ALL_EXTRA_BYTES
         return cls(file, path, head, table, n_points, options, chosen, notes)
 
     def chunks(self, rows: tuple[int, int]) -> Iterator[Chunk]:
@@ -236,13 +239,19 @@ class _Reader:
         chunk = Chunk(
             xyz,
             fraction,
-            intensity=np.asarray(points["intensity"], dtype=np.float32),
+            intensity=np.asarray(points[self.intensity], dtype=np.float32),
             rgb=rgb,
             classification=classes,
             station=np.asarray(points["point_source_id"]),
             fields=self._fields(points) if self.options.has_fields else {},
         )
         return chunk if is_bad is None else chunk.take(~is_bad)
+
+    @property
+    def intensity(self) -> str:
+        """Name of the value that holds intensities."""
+        layout = self.head.header.point_format
+        return ORIGINAL_INTENSITY if _has_original_intensity(layout) else "intensity"
 
     def _marked(self, points: Any, classes: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
         """Which points the file marks as none, and counts of why; None if no point is."""
@@ -291,6 +300,19 @@ def _field_infos(layout: "laspy.PointFormat", no_data: dict[str, float]) -> dict
             str(dimension.description),
         )
     return infos
+
+
+def _has_original_intensity(layout: "laspy.PointFormat") -> bool:
+    return any(
+        d.name == ORIGINAL_INTENSITY and d.dtype == np.float32 for d in layout.extra_dimensions
+    )
+
+
+def _storage(head: LasHead) -> Storage | None:
+    steps, offsets = np.array(head.header.scales), np.array(head.header.offsets)
+    if not (np.isfinite([steps, offsets]).all() and (steps > 0).all()):
+        return None
+    return Storage(steps, offsets, head.projection, str(head.header.uuid))
 
 
 def _table_note(path: Path) -> Note:

@@ -56,6 +56,8 @@ class LasHead:
         Stored extra values that stand for none, by name.
     notes : list of Note
         What was mended.
+    projection : tuple of (int, bytes)
+        The records that name the reference system, by their numbers.
     """
 
     header: "laspy.LasHeader"
@@ -65,6 +67,7 @@ class LasHead:
     has_new_items: bool = False
     no_data: dict[str, float] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
+    projection: tuple[tuple[int, bytes], ...] = ()
 
 
 def read_head(file: BinaryIO, path: Path) -> LasHead:
@@ -120,7 +123,17 @@ def read_head(file: BinaryIO, path: Path) -> LasHead:
         raise damaged(path, "LAS") from error
     if kind & _COMPRESSED and not packing:
         raise damaged(path, "LAZ", "it does not say how its points are packed")
-    return LasHead(header, _system(contents), announced, packing, has_new_items, no_data, notes)
+    own = {number: data for (user, number), data in contents.items() if user == b"LASF_Projection"}
+    return LasHead(
+        header,
+        _system(own),
+        announced,
+        packing,
+        has_new_items,
+        no_data,
+        notes,
+        tuple(own.items()),
+    )
 
 
 def _mend_records(
@@ -258,9 +271,8 @@ def _extended_records(
 _WKT, _KEYS, _TEXTS = 2112, 34735, 34737
 
 
-def _system(contents: dict[tuple[bytes, int], bytes]) -> ReferenceSystem:
-    """The reference system from the well-known text or the GeoTIFF keys."""
-    own = {number: data for (user, number), data in contents.items() if user == b"LASF_Projection"}
+def _system(own: dict[int, bytes]) -> ReferenceSystem:
+    """The reference system from the well-known text or the GeoTIFF keys, by their numbers."""
     text = own.get(_WKT, b"").decode("utf-8", errors="replace").strip("\0 \r\n\t")
     if text:
         return from_wkt(text)

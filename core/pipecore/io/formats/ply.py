@@ -6,7 +6,7 @@ progress and cancel, and nothing is allocated on the header's word alone.
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,12 +21,14 @@ from pipecore.io.source import (
     DEFAULT,
     Chunk,
     OpenOptions,
+    ScanInfo,
     Source,
     damaged,
     raise_read_errors,
     truncated,
     truncated_note,
 )
+from pipecore.io.storage import KEY, Extras, parse_extras
 from pipecore.io.table import Dialect, Table
 from pipecore.notes import Note
 
@@ -77,6 +79,8 @@ class _Header:
     n_lines: int
     size: int
     """Bytes."""
+    extras: Extras | None
+    """What this program has written besides the points."""
 
     def dtype(self, element: _Element) -> np.dtype[Any]:
         # Numbered, since a header may repeat a name.
@@ -93,11 +97,7 @@ def open_source(path: Path, options: OpenOptions = DEFAULT) -> Iterator[Source]:
     with file:
         with raise_read_errors(path, "PLY"):
             header = _read_header(file, path)
-            columns = {
-                role: i
-                for role, i in find_columns(header.vertex.names).items()
-                if not header.vertex.properties[i].count_kind
-            }
+            columns = _columns(header)
             if not has_coordinates(columns):
                 raise damaged(path, "PLY", "its vertices have no x, y and z")
             _check_faces(header, path, notes)
@@ -107,7 +107,37 @@ def open_source(path: Path, options: OpenOptions = DEFAULT) -> Iterator[Source]:
             fields=tuple(header.vertex.names),
             n_points=header.vertex.count,
             notes=notes,
+            **_told(header.extras),
         )
+
+
+def _columns(header: _Header) -> dict[str, int]:
+    """Places of the properties that have a role."""
+    properties = header.vertex.properties
+    found = find_columns(header.vertex.names)
+    if header.extras is not None:
+        fields = header.extras.fields
+        found = {
+            p.name.removeprefix("scalar_"): i
+            for i, p in enumerate(properties)
+            if p.name not in fields and p.name.removeprefix("scalar_") in found
+        }
+    return {role: i for role, i in found.items() if not properties[i].count_kind}
+
+
+def _told(extras: Extras | None) -> dict[str, Any]:
+    """What is known of a file that this program has written."""
+    if extras is None:
+        return {}
+    factors = np.ones(3)
+    if extras.system.plan is not None and extras.system.height is not None:
+        factors = np.array([extras.system.plan[1]] * 2 + [extras.system.height[1]])
+    return {
+        "system": extras.system,
+        "storage": extras.storage,
+        "scans": [ScanInfo(s.name, s.position / factors) for s in extras.scans],
+        "field_infos": extras.infos(),
+    }
 
 
 def _check_faces(header: _Header, path: Path, notes: list[Note]) -> None:
@@ -135,13 +165,18 @@ def _chunks(
 ) -> Iterator[Chunk]:
     with raise_read_errors(path, "PLY"):
         maker = ChunkMaker(tuple(columns))
+        extras = header.extras
         more = _more_fields(header, columns) if options.has_fields else {}
         for values, fraction in _values(file, path, header, notes):
-            yield maker.chunk(
+            fields = {name: values(i) for name, i in more.items()}
+            chunk = maker.chunk(
                 lambda role, values=values: values(columns[role]),  # type: ignore[misc]
                 fraction,
-                {name: values(i) for name, i in more.items()},
+                fields if extras is None else extras.joined(fields),
             )
+            if extras is not None and extras.scans and chunk.station is not None:
+                chunk = replace(chunk, station=chunk.station - 1)
+            yield chunk
 
 
 def _more_fields(header: _Header, columns: dict[str, int]) -> dict[str, int]:
@@ -265,9 +300,11 @@ def _read_header(file: BinaryIO, path: Path) -> _Header:
     elements: list[_Element] = []
     byte_order: str | None = None
     n_lines = place = 0
+    told: list[str] = []
     while (end := head.find(mark, place)) >= 0 or place < len(head):
         end = len(head) if end < 0 else end
-        words = head[place:end].decode("latin-1").split()
+        line = head[place:end].decode("latin-1")
+        words = line.split()
         place, n_lines = end + 1, n_lines + 1
         match words:
             case ["end_header"]:
@@ -282,6 +319,8 @@ def _read_header(file: BinaryIO, path: Path) -> _Header:
                 elements[-1].properties.append(_Property(name, _TYPES[kind], _TYPES[count]))
             case ["property", kind, *names] if elements and kind in _TYPES and names:
                 elements[-1].properties.append(_Property(" ".join(names), _TYPES[kind]))
+            case ["comment", word, *_] if word == KEY:
+                told.append(line.rstrip("\r")[len(f"comment {KEY} ") :])
             case [] | ["ply"] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:
@@ -294,7 +333,10 @@ def _read_header(file: BinaryIO, path: Path) -> _Header:
         raise damaged(path, "PLY", f"its header names no {missing}")
     n_faces = sum(e.count for e in elements if e.name in ("face", "tristrips"))
     file.seek(place)
-    return _Header(byte_order, elements[:position], elements[position], n_faces, n_lines, place)
+    extras = parse_extras("".join(told)) if told else None
+    return _Header(
+        byte_order, elements[:position], elements[position], n_faces, n_lines, place, extras
+    )
 
 
 def _skip_to_vertices(file: BinaryIO, path: Path, header: _Header) -> None:
