@@ -84,6 +84,43 @@ def check_positions(positions: ArrayLike) -> NDArray[np.float64]:
     return array.reshape(-1, 3)
 
 
+def check_station_ids(
+    station: ArrayLike, n_points: int, positions: NDArray[np.float64]
+) -> NDArray[np.uint16]:
+    """Return the number of each point's station.
+
+    Parameters
+    ----------
+    station : int or array_like
+        From 1 on: one for all points, or shape (n_points,).
+    n_points : int
+    positions : ndarray
+        Scanner positions in the order of the numbers, shape (k, 3); k = 0 if none is known.
+
+    Returns
+    -------
+    ndarray
+        uint16, shape (n_points,).
+
+    Raises
+    ------
+    TypeError
+        If they are not whole numbers.
+    ValueError
+        If they are of another shape, or number a station 0 or one without its position.
+    """
+    if np.ndim(station) == 0:
+        station = np.full(n_points, station)
+    ids = check_column(station, "the stations' numbers", n_points, np.uint16)
+    if n_points and ids.min() < 1:
+        raise ValueError("stations are numbered from 1 on, but some points have station 0")
+    if len(positions) and ids.max(initial=0) > len(positions):
+        raise ValueError(
+            f"there are points of station {ids.max()}, but only {len(positions)} scanner positions"
+        )
+    return ids
+
+
 def check_column(
     values: ArrayLike,
     name: str,

@@ -89,6 +89,17 @@ def test_that_values_of_points_get_the_types_of_a_cloud() -> None:
     np.testing.assert_allclose(cloud.world(cloud.stations), [[0.0, 0.0, 1.5]])
 
 
+@pytest.mark.parametrize(("station", "ids"), [(2, [2, 2, 2]), ([1, 3, 1], [1, 3, 1])])
+def test_that_points_have_one_station_or_each_its_own(station: Any, ids: list[int]) -> None:
+    cloud = PointCloud.from_points(CORNERS, station=station)
+    assert cloud.station is not None
+    assert cloud.station.dtype == np.uint16
+    assert cloud.station.tolist() == ids
+    assert len(cloud.station_names) == max(ids)
+    known = PointCloud.from_points(CORNERS, station=station, stations=np.ones((4, 3)))
+    assert len(known.station_names) == len(known.stations) == 4
+
+
 def test_that_the_caller_s_array_may_change_afterwards() -> None:
     points = np.array(CORNERS)
     cloud = PointCloud.from_points(points)
@@ -135,6 +146,11 @@ def test_that_what_are_no_points_is_answered_with_what_is_wrong(
         ({"stations": [1.0, 2.0]}, ValueError, r"shape \(3,\) or \(k, 3\)"),
         ({"stations": [[0.0, 0.0, math.inf]]}, ValueError, "infinite"),
         ({"intensity": ["a", "b", "c"]}, TypeError, "the intensity must be real numbers"),
+        ({"station": [1, 2]}, ValueError, r"the stations' numbers must have shape \(3,\)"),
+        ({"station": 1.5}, TypeError, "the stations' numbers must be whole numbers"),
+        ({"station": [0, 1, 2]}, ValueError, "numbered from 1 on"),
+        ({"station": 70_000}, ValueError, "from 0 to 65535"),
+        ({"station": [1, 3, 2], "stations": np.zeros((2, 3))}, ValueError, "but only 2 scanner"),
     ],
 )
 def test_that_values_that_do_not_fit_the_points_are_named(

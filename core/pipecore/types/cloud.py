@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pipecore.caller_arrays import check_column, check_coordinates, check_positions
+from pipecore.caller_arrays import (
+    check_column,
+    check_coordinates,
+    check_positions,
+    check_station_ids,
+)
 from pipecore.display import Summarised
 from pipecore.local_frame import choose_origin, to_local
 from pipecore.notes import Note
@@ -159,6 +164,7 @@ class PointCloud(Summarised):
         intensity: ArrayLike | None = None,
         rgb: ArrayLike | None = None,
         classification: ArrayLike | None = None,
+        station: ArrayLike | None = None,
         stations: ArrayLike | None = None,
         crs: str = "",
     ) -> "PointCloud":
@@ -175,9 +181,13 @@ class PointCloud(Summarised):
             Whole numbers from 0 to 255, shape (n, 3).
         classification : array_like, optional
             ASPRS classes, shape (n,).
+        station : int or array_like, optional
+            Number of the station that all points or each was scanned from, from 1 on, shape
+            () or (n,).
         stations : array_like, optional
-            Scanner positions in world coordinates, shape (3,) or (k, 3). They say along
-            which line each point's noise is, which makes radii better.
+            Scanner positions in world coordinates, shape (3,) or (k, 3), in the order of the
+            stations' numbers; nan where one is not known. They say along which line each
+            point's noise is, which makes radii better.
         crs : str
             The coordinate reference system's name.
 
@@ -197,6 +207,9 @@ class PointCloud(Summarised):
         world = check_coordinates(xyz)
         origin = choose_origin(world) if len(world) else np.zeros(3)
         n = len(world)
+        positions = np.empty((0, 3)) if stations is None else check_positions(stations)
+        ids = None if station is None else check_station_ids(station, n, positions)
+        n_stations = 0 if ids is None else max(int(ids.max(initial=0)), len(positions))
         return cls(
             origin=origin,
             xyz=to_local(world, origin),
@@ -207,7 +220,9 @@ class PointCloud(Summarised):
             classification=None
             if classification is None
             else check_column(classification, "the classes", n, np.uint8),
-            stations=np.empty((0, 3)) if stations is None else check_positions(stations) - origin,
+            station=ids,
+            station_names=tuple(f"Station {i + 1}" for i in range(n_stations)),
+            stations=positions - origin,
             crs=crs,
         )
 
