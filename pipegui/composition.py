@@ -20,6 +20,7 @@ from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.scans import Scans
 from pipegui.controllers.session import Session
 from pipegui.controllers.settings_files import SettingsFiles
+from pipegui.controllers.text_columns import TextColumns
 from pipegui.controllers.view_updates import ViewUpdates
 from pipegui.model.presets import Presets
 from pipegui.window.main_window import MainWindow
@@ -68,9 +69,11 @@ def compose(
             session, copies, project.saving, project.snapshot, lambda: project.has_unsaved_work
         )
     rereading = Rereading(session)
+    columns = TextColumns(session, window, rereading)
     controllers = Controllers(
-        Scans(session, window, rereading),
+        Scans(session, window, rereading, columns),
         rereading,
+        columns,
         project,
         ElementEdits(session, window),
         Clicks(session),

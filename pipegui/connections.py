@@ -18,6 +18,7 @@ from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.scans import Scans
 from pipegui.controllers.session import Session
 from pipegui.controllers.settings_files import SettingsFiles
+from pipegui.controllers.text_columns import TextColumns
 from pipegui.controllers.view_updates import ViewUpdates
 from pipegui.i18n.texts import LANGUAGES, tr
 from pipegui.model import commands, element_commands, selection_commands, view_commands
@@ -38,6 +39,7 @@ class Controllers:
 
     scans: Scans
     rereading: Rereading
+    columns: TextColumns
     project: ProjectSession
     element_edits: ElementEdits
     clicks: Clicks
@@ -58,6 +60,8 @@ def handlers(
     edits, preferences = controllers.element_edits, controllers.preferences
     found: dict[str, Callable[..., object]] = {
         "open": scans.ask_open,
+        "open_text": controllers.columns.ask_open,
+        "change_columns": controllers.columns.change_active,
         "open_project": project.ask_open,
         "save": project.save,
         "save_as": project.save_as,
@@ -297,7 +301,7 @@ def connect_jobs(window: MainWindow, session: Session, controllers: Controllers)
     jobs.failed.connect(lambda message, details: show(message, "error", details))
     jobs.scan_read.connect(controllers.scans.on_scan_read)
     jobs.scan_read_again.connect(controllers.scans.on_scan_read_again)
-    jobs.read_failed.connect(lambda _, message, details: show(message, "error", details))
+    jobs.read_failed.connect(controllers.columns.on_read_failed)
     jobs.detected.connect(controllers.scans.on_detected)
     jobs.edited.connect(controllers.element_edits.on_edited)
     jobs.written.connect(lambda path: show(tr("Saved “{path}”.").format(path=path)))

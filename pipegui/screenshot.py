@@ -35,6 +35,7 @@ class Screenshot(QObject):
         self._window, self._path = window, path
         jobs.detected.connect(lambda *_: self._look_again())
         jobs.failed.connect(self._fail)
+        jobs.read_failed.connect(lambda _, message, details: self._fail(message, details))
         self._last: QImage | None = None
         self._n_looks = 0
 

@@ -7,7 +7,7 @@ from PySide6.QtCore import QSettings, QStandardPaths
 from PySide6.QtWidgets import QFileDialog, QWidget
 
 from pipecore.errors import PipecoreError
-from pipecore.io import file_filter
+from pipecore.io import file_filter, formats
 from pipegui.controllers.session import Session
 from pipegui.i18n.texts import error_text, tr
 from pipegui.project.project_file import SUFFIX
@@ -22,6 +22,21 @@ def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
         tr("Open laser scans"),
         _last_folder(settings),
         _scans_filter() + ";;" + tr("Projects (*{suffix})").format(suffix=SUFFIX),
+    )
+    paths = [Path(name) for name in names]
+    if paths:
+        settings.setValue("files/folder", str(paths[0].parent))
+    return paths
+
+
+def ask_text(parent: QWidget, settings: QSettings) -> list[Path]:
+    """Ask for text files to open."""
+    endings = next(" ".join(f"*{e}" for e in f.endings) for f in formats() if f.module == "text")
+    names, _ = QFileDialog.getOpenFileNames(
+        parent,
+        tr("Open text with columns"),
+        _last_folder(settings),
+        ";;".join([tr("Text ({endings})").format(endings=endings), tr("All files") + " (*)"]),
     )
     paths = [Path(name) for name in names]
     if paths:

@@ -9,6 +9,7 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QAbstractButton, QMessageBox, QWidget
 
 from pipecore.errors import CancelledError, ReadError
+from pipecore.io import is_text
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.autosave import Snapshot
 from pipegui.controllers.session import Session
@@ -315,7 +316,8 @@ class ProjectSession(QObject):
                         tr("The project was not opened: {error}").format(error=error_text(error))
                     ) from error
                 cloud = replace(cloud, source=path)
-                scans.append(scan.with_cloud(cloud, reading, fingerprint, others))
+                scan_read = scan.with_cloud(cloud, reading, fingerprint, others)
+                scans.append(replace(scan_read, is_text=is_text(path)))
             return tuple(scans)
 
         self._session.jobs.run(

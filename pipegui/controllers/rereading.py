@@ -30,6 +30,10 @@ class Rereading(QObject):
         # Until it is read, the mark stays at the unit that it has.
         self._session.refused.emit()
 
+    def with_columns(self, scan: Scan, columns: str) -> None:
+        """Read a scan anew, its text's columns as they are named."""
+        self._again(scan, replace(scan.reading, columns=columns))
+
     def offers(self, scan: Scan, units: Sequence[LengthUnit]) -> Mapping[str, Callable[[], object]]:
         """Return answers that read a scan anew in other units, with what they do."""
         return {

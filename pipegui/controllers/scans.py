@@ -12,12 +12,14 @@ from pipecore.types import PointCloud, Result
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.rereading import Rereading
 from pipegui.controllers.session import Session
+from pipegui.controllers.text_columns import TextColumns
 from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import count, tr
 from pipegui.model import commands
 from pipegui.model.document import Scan
 from pipegui.project.project_file import SUFFIX
 from pipegui.states import descriptions
+from pipegui.states.text_roles import columns_text
 from pipegui.states.unit_texts import doubts_unit, other_units, units_in_doubt
 
 HARMLESS = {note.template for note in left_out_notes("", {NO_RETURN: 1})}
@@ -35,9 +37,12 @@ class Scans(QObject):
     """Path of a project among the files to open."""
     recent_files_changed = Signal()
 
-    def __init__(self, session: Session, window: QWidget, rereading: Rereading) -> None:
+    def __init__(
+        self, session: Session, window: QWidget, rereading: Rereading, columns: TextColumns
+    ) -> None:
         super().__init__(session)
         self._session, self._window, self._rereading = session, window, rereading
+        self._columns = columns
         self._together: list[Scan] = []
         """Scans that were opened together."""
 
@@ -87,7 +92,12 @@ class Scans(QObject):
             opened = tuple(scans)
             answers[tr("Join to one cloud")] = lambda: self._rereading.join(opened)
         else:
-            answers |= self._rereading.offers(scans[0], units_in_doubt(scans[0]))
+            [scan] = scans
+            answers |= self._rereading.offers(scan, units_in_doubt(scan))
+            if scan.guessed_columns:
+                guess = columns_text(scan.guessed_columns)
+                lines.append(tr("Columns guessed: {columns}.").format(columns=guess))
+                answers[tr("Change columns…")] = lambda: self._columns.change(scan)
         is_warning = any(note.template not in HARMLESS for note in notes)
         if lines:
             severity = "warning" if is_warning else "info"

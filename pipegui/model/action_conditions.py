@@ -22,6 +22,7 @@ def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool
     return {
         "scan": document.scan is not None,
         "scans": len(document.scans) > 1,
+        "text": document.scan is not None and document.scan.is_text,
         "result": result is not None,
         "deformations": result is not None and bool(result.deformations),
         "selection": has_selection,

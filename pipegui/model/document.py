@@ -188,6 +188,9 @@ class Scan:
     others: tuple[Path, ...] = ()
     """More files of the same cloud, besides its source."""
 
+    is_text: bool = False
+    """Whether it was read from text."""
+
     guessed_columns: str = ""
     """What the columns of a text file were taken for, where nothing in it says so."""
 

@@ -66,6 +66,12 @@ def _inside(title: str, *specs: ActionSpec) -> tuple[ActionSpec, ...]:
 MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
     "File": (
         _A("open", "Open…", "Open laser scans", "folder-open-outline", "Ctrl+O"),
+        _A(
+            "open_text",
+            "Open text with columns…",
+            "Open text files and say what their columns hold",
+            "table-column",
+        ),
         _A("open_project", "Open project…", "Open saved work", "", "Ctrl+Shift+O"),
         _A(
             "save",
@@ -286,6 +292,14 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "scans",
         ),
         _SEPARATOR,
+        _A(
+            "change_columns",
+            "Columns of the text…",
+            "Say what the columns of the scan's text file hold, and read it anew",
+            "table-column",
+            "",
+            "text",
+        ),
         *_inside("Length unit", *(_unit(unit) for unit in LengthUnit)),
     ),
     "Detect": (

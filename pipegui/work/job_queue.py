@@ -193,11 +193,21 @@ class JobQueue(QObject):
         queue = self if can_wait else self._parallel_queue()
 
         def work(progress: JobProgress) -> Scan:
+            from pipecore.io import guessed_columns, is_text  # noqa: PLC0415 - as `read_files`
+
             fingerprint = Fingerprint.if_there(paths[0])
             cloud = self.read(paths, reading, progress)
             if not len(cloud):
                 raise ReadError(tr("“{name}” holds no points.").format(name=name))
-            return Scan(name, cloud, reading=reading, fingerprint=fingerprint, others=paths[1:])
+            return Scan(
+                name,
+                cloud,
+                reading=reading,
+                fingerprint=fingerprint,
+                others=paths[1:],
+                is_text=is_text(paths[0]),
+                guessed_columns="" if reading.columns else guessed_columns(paths[0]),
+            )
 
         def failed(message: str, details: str) -> None:
             self.read_failed.emit(paths, message, details)

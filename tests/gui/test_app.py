@@ -23,8 +23,8 @@ def faked(qapp, monkeypatch):
 
 def _read(path, settings, progress):
     progress.update("reading", 0.5)
-    if not path.is_file():
-        raise ReadError(f"There is no file “{path}”.")
+    if not path[0].is_file():
+        raise ReadError(f"There is no file “{path[0]}”.")
     return make_cloud()
 
 

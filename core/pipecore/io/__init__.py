@@ -13,18 +13,27 @@ from pipecore.io.mapped import reserve
 from pipecore.io.reading import Corners, corners_of, read
 from pipecore.io.registry import Format, file_filter, formats, identify
 from pipecore.io.summary import FileInfo, StationInfo, info
+from pipecore.io.text_format import DecimalSign, Separator, TextFormat
+from pipecore.io.text_preview import TextPreview, guessed_columns, is_text, preview_text
 from pipecore.io.writing import with_fields, write, write_laz
 
 __all__ = [
     "Corners",
+    "DecimalSign",
     "FileInfo",
     "Format",
+    "Separator",
     "StationInfo",
+    "TextFormat",
+    "TextPreview",
     "corners_of",
     "file_filter",
     "formats",
+    "guessed_columns",
     "identify",
     "info",
+    "is_text",
+    "preview_text",
     "read",
     "reserve",
     "with_fields",

@@ -59,6 +59,11 @@ class Dialect:
         """Whether commas separate values and decimals, which quotes tell apart."""
         return self.delimiter == "," and self.has_decimal_commas
 
+    @property
+    def is_ambiguous(self) -> bool:
+        """Whether its commas may as well separate values."""
+        return self.delimiter is None and self.has_decimal_commas
+
     def as_plain(self, lines: list[str]) -> tuple[list[str], str | None]:
         """Return lines without decimal commas, and what separates their values."""
         if self.is_quoted:
@@ -75,7 +80,7 @@ def sniff_dialect(line: str) -> Dialect:
         return Dialect(";", has_decimal_commas=True, closes_lines=closes == ";")
     if "\t" in line.strip():
         values = [v.strip().strip('"') for v in line.strip().split("\t")]
-        if _have_decimal_commas(values):
+        if has_decimal_commas(values):
             return Dialect("\t", has_decimal_commas=True)
         # Tabs among spaces only line columns up.
         if "," not in line and len(values) >= 3 and ("" in values or " " in "".join(values)):
@@ -84,12 +89,12 @@ def sniff_dialect(line: str) -> Dialect:
     values = [v.strip('"') for v in line.split()]
     if "," not in line or (len(values) >= 3 and all(map(_DECIMAL_COMMA.fullmatch, values))):
         return Dialect(None, has_decimal_commas="," in line)
-    is_quoted = '"' in line and _have_decimal_commas(next(csv.reader([line.strip()])))
+    is_quoted = '"' in line and has_decimal_commas(next(csv.reader([line.strip()])))
     return Dialect(",", has_decimal_commas=is_quoted, closes_lines=closes == ",")
 
 
-def _have_decimal_commas(values: Sequence[str]) -> bool:
-    """Whether commas stand in some of these values, and only where they are decimal."""
+def has_decimal_commas(values: Sequence[str]) -> bool:
+    """Return whether commas stand in some of these values, and only where they are decimal."""
     commas = [v for v in values if "," in v]
     return bool(commas) and all(map(_DECIMAL_COMMA.fullmatch, commas))
 

@@ -94,7 +94,9 @@ class InputSettings(Group, name="input"):
         "",
         "Columns of text",
         "What the columns of a text file hold, such as “x,y,z,intensity”; “-” for what is "
-        "skipped. Empty: as its header names them or its first lines suggest.",
+        "skipped. Empty: as its header names them or its first lines suggest. Behind it may follow "
+        "“|separator=tab|decimal=comma|skip=3”: what separates columns, the sign before decimals, "
+        "and how many lines at the top are passed over.",
     )
 
 

@@ -37,8 +37,36 @@ def open_source(path: Path, options: OpenOptions = DEFAULT) -> Iterator[Source]:
         )
 
 
+def first_points(path: Path, columns: str, n_points: int) -> tuple[Layout, Chunk]:
+    """Return how a text file is laid out, and its first points.
+
+    Parameters
+    ----------
+    path : Path
+    columns : str
+        What the columns hold; see `InputSettings.columns`.
+    n_points : int
+        About so many.
+
+    Raises
+    ------
+    ReadError
+        If it cannot be read so.
+    """
+    options = OpenOptions(columns)
+    with raise_read_errors(path, "text"), path.open("rb") as file:
+        layout = find_layout(file, path, columns)
+        file.seek(layout.n_bytes_before)
+        return layout, next(_chunks(file, path, layout, options, [], n_points))
+
+
 def _chunks(
-    file: BinaryIO, path: Path, layout: Layout, options: OpenOptions, notes: list[Note]
+    file: BinaryIO,
+    path: Path,
+    layout: Layout,
+    options: OpenOptions,
+    notes: list[Note],
+    n_points: int | None = None,
 ) -> Iterator[Chunk]:
     with raise_read_errors(path, "text"):
         table = Table(
@@ -48,6 +76,7 @@ def _chunks(
             layout.read_columns,
             layout.n_columns,
             layout.n_lines_before,
+            n_points,
             has_counts=layout.announced is not None,
         )
         position = {role: table.columns.index(column) for role, column in layout.columns.items()}

@@ -9,15 +9,15 @@ from typing import BinaryIO
 import numpy as np
 
 from pipecore.errors import ReadError
-from pipecore.io.columns import SKIPPED, find_columns, has_coordinates, parse_columns
+from pipecore.io.columns import SKIPPED, find_columns, has_coordinates
 from pipecore.io.table import (
     Dialect,
     is_comment,
     is_count,
     is_no_number,
     is_number,
-    sniff_dialect,
 )
+from pipecore.io.text_format import TextFormat
 from pipecore.types import Array
 
 HEAD_BYTES = 65536
@@ -79,16 +79,16 @@ def find_layout(
     if len(head) == HEAD_BYTES and len(raw_lines) > 1:
         raw_lines.pop()  # It may be cut.
     lines = [raw.decode("utf-8-sig", errors="replace").rstrip("\r\n") for raw in raw_lines]
-    chosen = parse_columns(columns) if columns.strip() else ()
+    chosen = TextFormat.parse(columns)
     announced, header, first = _first_point(lines, chosen)
     if first is None:
         raise ReadError("“{name}” holds no points.", name=path.name)
     sample = [line for line in lines[first : first + SAMPLE_LINES] if not is_comment(line)]
-    dialect = sniff_dialect(lines[first])
+    dialect = chosen.dialect(lines[first])
     values = dialect.split(lines[first])
     found: dict[str, int] = {}
-    if chosen:
-        names = _chosen_names(path, chosen, len(values), first)
+    if chosen.columns:
+        names = _chosen_names(path, chosen.columns, len(values), first)
     else:
         names, found = _columns_of(path, header, dialect, sample, values, first)
     found = found or find_columns(names)
@@ -109,26 +109,28 @@ def find_layout(
 
 
 def _first_point(
-    lines: Sequence[str], chosen: Sequence[str]
+    lines: Sequence[str], chosen: TextFormat
 ) -> tuple[int | None, str | None, int | None]:
     """The count of points, the line that names columns, and the number of the first point's."""
     announced, header = None, None
     for i, line in enumerate(lines):
-        if not chosen and _is_header(line):
+        if i < chosen.skip:
+            continue
+        if not chosen.columns and _is_header(line):
             header = line
         elif is_comment(line):
             continue
         elif announced is None and is_count(line):
             announced = int(line)
-        elif chosen and not _has_numbers(line):
+        elif chosen.columns and not _has_numbers(line, chosen):
             continue
         else:
             return announced, header, i
     return announced, header, None
 
 
-def _has_numbers(line: str) -> bool:
-    values = sniff_dialect(line).split(line)
+def _has_numbers(line: str, chosen: TextFormat) -> bool:
+    values = chosen.dialect(line).split(line)
     return sum(map(is_number, values)) >= 3
 
 
