@@ -47,7 +47,8 @@ class Exports:
         scan = self._session.document.scan
         if scan is None or scan.result is None:
             return
-        content = (scan.result, scan.reviews) if table == "deformations" else (scan.result,)
+        more = {"deformations": scan.reviews, "elements": scan.cloud}
+        content = (scan.result, more[table]) if table in more else (scan.result,)
         write = getattr(report, f"write_{table}_csv")
         name = f"{self._stem()} {table}.csv"
         self._save(tr(EXPORT[table]), name, tr(CSV), lambda path: write(path, *content))

@@ -43,7 +43,8 @@ def run(args: argparse.Namespace, console: Console) -> None:
     ahead = "pipecore.report.html", "pipecore.report.figures"
     threading.Thread(target=lambda: list(map(importlib.import_module, ahead)), daemon=True).start()
     with _detected(args, settings, console) as (cloud, result):
-        write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
+        notes = write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
+        console.warn(notes)
 
     console.say(f"{summarise(result)}.")
     for line in deformation_lines(result):

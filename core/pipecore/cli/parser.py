@@ -41,6 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_detect(commands)
     _add_simulate(commands)
     _add_info(commands)
+    _add_convert(commands)
     return parser
 
 
@@ -64,27 +65,14 @@ def _add_detect(commands: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
-    parser.add_argument(
-        "inputs",
-        nargs="+",
-        type=Path,
-        metavar="INPUT",
-        help="scan (LAS, LAZ, E57, PTX, PLY, PCD, PTS, XYZ, CSV); several are taken as one cloud",
-    )
+    _add_inputs(parser)
     parser.add_argument(
         "-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the report"
     )
     parser.add_argument(
         "--settings", type=Path, metavar="FILE.toml", help="settings; flags win over them"
     )
-    parser.add_argument(
-        "--box",
-        nargs=6,
-        type=float,
-        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
-        help="only points between these two corners, in the file's coordinates; of COPC files "
-        "the rest is not even read",
-    )
+    _add_box(parser)
     parser.add_argument(
         "--overwrite", action="store_true", help="replace a report that is already in DIR"
     )
@@ -126,6 +114,44 @@ def _add_info(commands: Any) -> None:
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.set_defaults(quiet=False, shows_stages=False)
     _add_settings(parser, READING)
+
+
+def _add_convert(commands: Any) -> None:
+    parser = commands.add_parser(
+        "convert",
+        help="write scans as LAS, LAZ, PLY or E57, with all that they hold",
+        description="Write scans, as one cloud, as LAS, LAZ, PLY or E57: coordinates to the last "
+        "digit, stations, reference system and all values of each point.",
+        allow_abbrev=False,
+    )
+    _add_inputs(parser)
+    parser.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="FILE", help="its ending is the format"
+    )
+    _add_box(parser)
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    _add_settings(parser, READING)
+
+
+def _add_inputs(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        type=Path,
+        metavar="INPUT",
+        help="scan (LAS, LAZ, E57, PTX, PLY, PCD, PTS, XYZ, CSV); several are taken as one cloud",
+    )
+
+
+def _add_box(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--box",
+        nargs=6,
+        type=float,
+        metavar=("X0", "Y0", "Z0", "X1", "Y1", "Z1"),
+        help="only points between these two corners, in the file's coordinates; of COPC files "
+        "the rest is not even read",
+    )
 
 
 def _add_settings(parser: argparse.ArgumentParser, keys: Collection[str] | None = None) -> None:

@@ -25,6 +25,14 @@ def as_mapped(array: np.memmap[Any, Any]) -> NDArray[Any]:
     return np.asarray(array)
 
 
+def is_mapped(array: NDArray[Any]) -> bool:
+    """Return whether an array is kept in a file."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        owner = owner.base
+    return isinstance(owner, mmap.mmap)
+
+
 def drop_pages() -> None:
     """Give the memory into which files are mapped back; what they hold stays on the disk."""
     if not hasattr(mmap, "MADV_DONTNEED"):

@@ -10,9 +10,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from pipecore.errors import ReadError, WriteError
 from pipecore.io.atomic import write_file
+from pipecore.io.columns import find_columns
 from pipecore.io.placing import place_of
 from pipecore.io.reading import read
-from pipecore.io.source import CHUNK_POINTS
+from pipecore.io.registry import identify
+from pipecore.io.source import CHUNK_POINTS, OpenOptions
 from pipecore.notes import Note
 from pipecore.progress import NoProgress, Progress
 from pipecore.types import PointCloud
@@ -188,6 +190,27 @@ def with_fields(
     if not _are_same(cloud, again):
         raise ReadError("“{name}” has changed since it was read.", name=cloud.reading.paths[0].name)
     return again
+
+
+def may_have_fields(cloud: PointCloud) -> bool:
+    """Return whether `with_fields` may find more than a cloud has.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    """
+    if cloud.fields or cloud.reading is None:
+        return False
+    for path in cloud.reading.paths:
+        try:
+            with identify(path).open(
+                path, OpenOptions(cloud.reading.arguments["columns"])
+            ) as source:
+                if len(find_columns(source.fields)) < len(source.fields):
+                    return True
+        except ReadError:
+            return True
+    return False
 
 
 def _are_same(cloud: PointCloud, again: PointCloud) -> bool:

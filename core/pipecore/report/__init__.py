@@ -8,13 +8,20 @@ Importing this package imports neither the plot library nor the LAZ writer.
 """
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.io import write_directory, write_file, write_laz
-from pipecore.progress import NoProgress, Progress
+from pipecore.errors import ReadError
+from pipecore.io import with_fields, write_directory, write_file, write_laz
+from pipecore.io.mapped import is_mapped
+from pipecore.io.writing import may_have_fields
+from pipecore.notes import Note
+from pipecore.progress import NoProgress, Progress, Renamed
 from pipecore.report.loading import load
 from pipecore.report.reading import result_from_dict
 from pipecore.report.result_json import result_to_dict, write_result_json
@@ -59,7 +66,7 @@ def write_report(
     reviews: Mapping[int, Review] = NOT_REVIEWED,
     overwrite: bool = False,
     progress: Progress | None = None,
-) -> None:
+) -> tuple[Note, ...]:
     """Write the whole report into a folder: all of it or nothing.
 
     It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``result.json``,
@@ -81,6 +88,11 @@ def write_report(
     progress : Progress, optional
         May cancel; then nothing was written.
 
+    Returns
+    -------
+    tuple of Note
+        What could not be written as it is; see `write_segments`.
+
     Raises
     ------
     ValueError
@@ -100,16 +112,17 @@ def write_report(
         )
     with write_directory(directory, overwrite=overwrite) as folder:
         (folder / "settings.toml").write_text(result.settings.to_toml(), encoding="utf-8")
-        write_elements_csv(folder / "elements.csv", result)
+        write_elements_csv(folder / "elements.csv", result, cloud)
         write_deformations_csv(folder / "deformations.csv", result, reviews)
         write_profiles_csv(folder / "profiles.csv", result, progress)
         write_result_json(folder / "result.json", result, progress)
         if cloud is None:
-            return
+            return ()
         write_html(folder / "report.html", cloud, result, progress)
-        write_segments(folder / "segments.laz", cloud, result, progress)
+        notes = write_segments(folder / "segments.laz", cloud, result, progress)
         if result.settings.deformation.mesh_exaggeration > 0:
             write_deformation_mesh(folder / "deformations.ply", cloud, result)
+        return notes
 
 
 def write_deformation_mesh(
@@ -212,10 +225,12 @@ def write_segments(
     cloud: PointCloud,
     result: Result,
     progress: Progress | None = None,
-) -> None:
+) -> tuple[Note, ...]:
     """Write the cloud as LAZ with segment_id, element_id and deviation_mm of each point.
 
-    Ids are 0 and deviations nan for points of none. Errors as for `write_report`.
+    Ids are 0 and deviations nan for points of none. The other values are those of the files
+    that the cloud came from, which are read again for them; `point_source_id` is the station.
+    Errors as for `write_report`.
 
     Parameters
     ----------
@@ -226,6 +241,11 @@ def write_segments(
     progress : Progress, optional
         May cancel; then nothing was written.
 
+    Returns
+    -------
+    tuple of Note
+        What LAS could not hold, and why values of the files are missing, if they are.
+
     Raises
     ------
     WriteError
@@ -233,22 +253,52 @@ def write_segments(
     CancelledError
         From `progress`.
     """
-    write_laz(
-        path,
-        cloud,
-        {
-            "segment_id": result.segment_id,
-            "element_id": result.element_id,
-            "deviation_mm": result.deviation,
-        },
-        factors={"deviation_mm": 1000.0},
-        kinds={
-            "segment_id": _narrowest(result.segment_id),
-            "element_id": _narrowest(result.element_id),
-        },
-        unit=result.file_unit,
-        progress=progress,
-    )
+    with _with_fields(path, cloud, progress or NoProgress()) as (full, notes):
+        return notes + write_laz(
+            path,
+            full,
+            {
+                "segment_id": result.segment_id,
+                "element_id": result.element_id,
+                "deviation_mm": result.deviation,
+            },
+            factors={"deviation_mm": 1000.0},
+            kinds={
+                "segment_id": _narrowest(result.segment_id),
+                "element_id": _narrowest(result.element_id),
+            },
+            unit=result.file_unit,
+            progress=progress,
+        )
+
+
+@contextmanager
+def _with_fields(
+    path: str | os.PathLike[str], cloud: PointCloud, progress: Progress
+) -> Iterator[tuple[PointCloud, tuple[Note, ...]]]:
+    """A cloud with all that its files hold, if they are still there and hold more."""
+    if not may_have_fields(cloud):
+        yield cloud, ()
+        return
+    # A cloud that is larger than memory is kept in files; so are its values.
+    with (
+        TemporaryDirectory(dir=Path(path).parent)
+        if is_mapped(cloud.xyz)
+        else nullcontext() as beside
+    ):
+        notes: tuple[Note, ...] = ()
+        folder = None if beside is None else Path(beside)
+        try:
+            cloud = with_fields(cloud, folder=folder, progress=Renamed(progress, "writing"))
+        except ReadError as error:
+            notes = (
+                Note(
+                    "“{name}” has no other values of the scan’s own file: {why}",
+                    name=Path(path).name,
+                    why=error,
+                ),
+            )
+        yield cloud, notes
 
 
 def _narrowest(ids: NDArray[np.int32]) -> np.dtype[np.unsignedinteger]:

@@ -24,9 +24,12 @@ from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.report.world import FileCoordinates
 from pipecore.rules import outside_diameter
 from pipecore.table import Table
-from pipecore.types import Array, ElementKind, Result, Review
+from pipecore.types import Array, ElementKind, PointCloud, Result, Review
 
 ROWS_AT_A_TIME = 5_000
+POINTS_AT_A_TIME = 1_000_000
+FEWEST_SEEN = 0.01
+"""A station has seen an element if at least this share of its points are from there."""
 NOT_REVIEWED: Mapping[int, Review] = MappingProxyType({})
 BLANK_WHERE_ZERO = {"fitting_id", "next_id"}
 """Columns of ids that may be of nothing: 0 in a table, empty in a file."""
@@ -34,12 +37,14 @@ BLANK_WHERE_ZERO = {"fitting_id", "next_id"}
 Column = tuple[str, NDArray[Any], int | None]
 
 
-def elements_table(result: Result) -> Table:
+def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
     """Return the elements of a result as columns, one row for each.
 
     Parameters
     ----------
     result : Result
+    cloud : PointCloud, optional
+        The cloud that `result` was detected in: says which stations saw each element.
 
     Returns
     -------
@@ -85,8 +90,28 @@ def elements_table(result: Result) -> Table:
             _texts("not_measurable", reasons),
             _texts("name", [e.name for e in elements]),
             _texts("run_name", run_names),
+            _texts("stations", _stations(result, cloud)),
         ]
     )
+
+
+def _stations(result: Result, cloud: PointCloud | None) -> list[str]:
+    """Ids of the stations that saw each element, such as “1+3”; "" where they are not known."""
+    if cloud is None or cloud.station is None:
+        return [""] * len(result.elements)
+    n_ids = 1 + max((e.element_id for e in result.elements), default=0)
+    n_stations = 1 + int(cloud.station.max(initial=0))
+    counts = np.zeros(n_ids * n_stations, np.int64)
+    for start in range(0, len(cloud), POINTS_AT_A_TIME):
+        rows = slice(start, start + POINTS_AT_A_TIME)
+        pairs = result.element_id[rows].astype(np.int64) * n_stations + cloud.station[rows]
+        counts += np.bincount(pairs, minlength=len(counts))[: len(counts)]
+    seen = counts.reshape(n_ids, n_stations)
+    least = np.maximum(1, FEWEST_SEEN * seen.sum(axis=1, keepdims=True))
+    return [
+        "+".join(map(str, np.flatnonzero(seen[e.element_id] >= least[e.element_id])))
+        for e in result.elements
+    ]
 
 
 def profiles_table(result: Result) -> Table:
@@ -219,20 +244,24 @@ def _reasons(reasons: Mapping[str, str]) -> str:
     return "; ".join(f"{name}: {why}" for name, why in reasons.items())
 
 
-def write_elements_csv(path: str | os.PathLike[str], result: Result) -> None:
+def write_elements_csv(
+    path: str | os.PathLike[str], result: Result, cloud: PointCloud | None = None
+) -> None:
     """Write the table of elements.
 
     Parameters
     ----------
     path : path
     result : Result
+    cloud : PointCloud, optional
+        The cloud that `result` was detected in: says which stations saw each element.
 
     Raises
     ------
     WriteError
         If the file cannot be written; what stood there before still does.
     """
-    write_csv(path, elements_table(result))
+    write_csv(path, elements_table(result, cloud))
 
 
 def write_profiles_csv(

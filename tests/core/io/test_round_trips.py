@@ -11,6 +11,7 @@ import pyproj
 import pytest
 
 from pipecore import io
+from pipecore.cli import main
 from pipecore.errors import CancelledError, ReadError, WriteError
 from pipecore.settings import LengthUnit
 from pipecore.types import Field, PointCloud
@@ -409,3 +410,14 @@ def test_that_damaged_descriptions_are_passed_over(tmp_path: Path, told: bytes) 
     end = raw.index(b"\n", start)
     (tmp_path / "a.ply").write_bytes(raw[:start] + b"comment pipegui " + told + raw[end:])
     assert len(io.read(tmp_path / "a.ply", has_fields=True)) == N
+
+
+def test_that_the_command_line_converts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    e57(tmp_path / "scans.e57")
+    assert main(["convert", str(tmp_path / "scans.e57"), "-o", str(tmp_path / "a.laz")]) == 0
+    said = capsys.readouterr()
+    assert said.out == f"3,000 points: {tmp_path / 'a.laz'}\n"
+    assert "does not hold where the scanners stood" in said.err
+    assert np.bincount(laspy.read(tmp_path / "a.laz").point_source_id).tolist() == [0, 1000, 2000]
+    assert main(["convert", str(tmp_path / "a.laz"), "-o", str(tmp_path / "a.xyz")]) == 1
+    assert "must end in one of .las, .laz, .ply, .e57" in capsys.readouterr().err
