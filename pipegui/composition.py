@@ -10,6 +10,7 @@ from pipegui.connections import Controllers
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.autosave import Autosave
 from pipegui.controllers.clicks import Clicks
+from pipegui.controllers.cloud_exports import CloudExports
 from pipegui.controllers.element_edits import ElementEdits
 from pipegui.controllers.exports import Exports
 from pipegui.controllers.hovering import Hovering
@@ -74,6 +75,7 @@ def compose(
         Scans(session, window, rereading, columns),
         rereading,
         columns,
+        CloudExports(session, window),
         project,
         ElementEdits(session, window),
         Clicks(session),

@@ -9,6 +9,7 @@ from pipecore.types import ReviewState
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.autosave import Autosave
 from pipegui.controllers.clicks import Clicks
+from pipegui.controllers.cloud_exports import CloudExports
 from pipegui.controllers.element_edits import ElementEdits
 from pipegui.controllers.exports import Exports
 from pipegui.controllers.hovering import Hovering
@@ -40,6 +41,7 @@ class Controllers:
     scans: Scans
     rereading: Rereading
     columns: TextColumns
+    cloud_exports: CloudExports
     project: ProjectSession
     element_edits: ElementEdits
     clicks: Clicks
@@ -107,6 +109,9 @@ def handlers(
         "previous_deformation": lambda: do(selection_commands.step_deformation, -1),
         "isolate": lambda: do(commands.isolate),
         "show_all": lambda: do(commands.show_all),
+        "export_cloud": controllers.cloud_exports.export_cloud,
+        "export_shown": controllers.cloud_exports.export_shown,
+        "export_selection": controllers.cloud_exports.export_selection,
         "export_report": exports.export_report,
         "export_picture": exports.export_picture,
         "demo": scans.open_demo,

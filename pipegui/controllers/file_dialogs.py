@@ -13,6 +13,7 @@ from pipegui.i18n.texts import error_text, tr
 from pipegui.project.project_file import SUFFIX
 
 N_RECENT = 10
+WRITTEN_CLOUDS = (".laz", ".las", ".ply", ".e57")
 
 
 def ask_scans(parent: QWidget, settings: QSettings) -> list[Path]:
@@ -106,6 +107,44 @@ def ask_target(
     return path if path.suffix else path.with_suffix(Path(name).suffix)
 
 
+def ask_cloud_target(
+    parent: QWidget, settings: QSettings, title: str, name: str, suffix: str
+) -> Path | None:
+    """Ask where to write points, and in which format.
+
+    Parameters
+    ----------
+    parent : QWidget
+        The dialog opens over it.
+    settings : QSettings
+        Remembers the folder used last.
+    title : str
+        Of the dialog.
+    name : str
+        The file's proposed name, without ending.
+    suffix : str
+        Ending of the format that is proposed; of LAZ if nothing can be written so.
+
+    Returns
+    -------
+    Path or None
+        None if the user cancels. A name without an ending gets that of the format chosen.
+    """
+    proposed = suffix if suffix in WRITTEN_CLOUDS else ".laz"
+    kinds = {f"{ending[1:].upper()} (*{ending})": ending for ending in WRITTEN_CLOUDS}
+    first = next(kind for kind, ending in kinds.items() if ending == proposed)
+    start = str(Path(_last_folder(settings)) / (name + proposed))
+    chosen, kind = QFileDialog.getSaveFileName(parent, title, start, ";;".join(kinds), first)
+    if not chosen:
+        return None
+    path = Path(chosen)
+    settings.setValue("files/folder", str(path.parent))
+    if path.suffix.lower() in WRITTEN_CLOUDS:
+        return path
+    # The dialog asked of a name without ending whether it may be overwritten.
+    return _vacant_file(path.with_name(path.name + kinds.get(kind, proposed)))
+
+
 def save_as(
     session: Session,
     parent: QWidget,
@@ -154,6 +193,14 @@ def _vacant(folder: Path) -> Path:
     while vacant.exists():
         number += 1
         vacant = folder.with_name(f"{folder.name} {number}")
+    return vacant
+
+
+def _vacant_file(path: Path) -> Path:
+    number, vacant = 1, path
+    while vacant.exists():
+        number += 1
+        vacant = path.with_stem(f"{path.stem} {number}")
     return vacant
 
 

@@ -35,6 +35,7 @@ def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool
         "box": view.clip_box is not None,
         "measured": bool(view.measurements),
         "hidden": bool(view.hidden_elements or view.hidden_stations),
+        "part": bool(view.clip_box or view.hidden_elements or view.hidden_stations),
         "busy": is_busy,
         "idle": not is_busy,
     }

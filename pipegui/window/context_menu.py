@@ -6,9 +6,20 @@ from PySide6.QtWidgets import QMenu, QWidget
 from pipegui.panels.project_tree import NodeKind
 from pipegui.window.actions import Actions
 
-_OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "")
+_OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "export_selection", "")
+_OF_STATIONS = ("show_all", "show_stations", "", "export_shown")
 CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
-    NodeKind.SCAN: ("fit", "show_all", "", "detect", "detect_in_box", "", "rename", "close_scan"),
+    NodeKind.SCAN: (
+        "fit",
+        "show_all",
+        "",
+        "detect",
+        "detect_in_box",
+        "",
+        "export_cloud",
+        "rename",
+        "close_scan",
+    ),
     NodeKind.RUN: (*_OF_ELEMENTS, "rename", "detect_around", "delete"),
     NodeKind.ELEMENT: (
         *_OF_ELEMENTS,
@@ -21,8 +32,8 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
         "detect_around",
         "delete",
     ),
-    NodeKind.STATIONS: ("show_stations", "show_all"),
-    NodeKind.STATION: ("show_stations", "show_all"),
+    NodeKind.STATIONS: _OF_STATIONS,
+    NodeKind.STATION: _OF_STATIONS,
     NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
     NodeKind.DEFORMATION: ("zoom", "isolate", "", "accept", "reject", "reopen"),
 }
