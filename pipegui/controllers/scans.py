@@ -84,6 +84,8 @@ class Scans(QObject):
         """Say what was left out or guessed of scans, with what can be done about it."""
         self._session.hide_message()
         notes = [note for scan in scans for note in scan.cloud.notes]
+        if len(scans) > 1:
+            notes = [note for note in notes if note.template not in HARMLESS]
         notes.sort(key=lambda note: not doubts_unit(note))
         lines = [reason_text(note) for note in notes]
         answers: dict[str, Callable[[], object]] = {}
