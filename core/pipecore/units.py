@@ -10,6 +10,14 @@ from pipecore.settings import LengthUnit
 SAME = 1e-7
 """Relative difference up to which two lengths are the same unit; feet differ by 2e-6."""
 
+MIN_METRES, MAX_METRES = 1e-9, 1e9
+"""Metres in a unit of length; what is shorter or longer is none, but a damaged number."""
+
+
+def is_unit(metres: float) -> bool:
+    """Return whether a number can be the metres in a unit of length; nan cannot."""
+    return MIN_METRES < metres < MAX_METRES
+
 
 @dataclass(frozen=True)
 class FileUnit:

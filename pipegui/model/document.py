@@ -117,7 +117,7 @@ class Selection:
 
 
 @dataclass(frozen=True)
-class Box:
+class ClipBox:
     """An upright box in the local coordinates of the active scan, metres."""
 
     low: tuple[float, float, float]
@@ -145,7 +145,7 @@ class ViewOptions:
     pinned_elements: tuple[int, ...] = ()
     """Elements that stay in the radius plot."""
     fly: bool = True
-    clip_box: Box | None = None
+    clip_box: ClipBox | None = None
     """Only what lies within is shown, or without if it is inverted."""
     shown_profile: int | None = None
     """The one profile of `shown_stack` that is shown in colour; None: all."""

@@ -9,7 +9,7 @@ from pipecore.types import Element, PointCloud
 from pipegui.model import result_queries
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.commands import set_view
-from pipegui.model.document import Box, ColourBy, Document, Limits, Measurement, Point, Tool
+from pipegui.model.document import ClipBox, ColourBy, Document, Limits, Measurement, Point, Tool
 from pipegui.model.selection_commands import select_parent, select_point
 
 POINT_SIZES = (0.4, 0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0, 4.0)
@@ -169,7 +169,7 @@ def invert_clip(document: Document) -> Document:
     low, high = extent(scan.cloud)
     if not box.is_inverted and (low >= box.low).all() and (high <= box.high).all():
         quarter = (high - low) / 4
-        middle = Box(_triple(low + quarter), _triple(high - quarter))
+        middle = ClipBox(_triple(low + quarter), _triple(high - quarter))
         box = clip_to_selection(set_clip_box(document, middle)).view.clip_box or middle
     return set_view(document, clip_box=replace(box, is_inverted=not box.is_inverted))
 
@@ -179,7 +179,7 @@ def clip_to_scan(document: Document) -> Document:
     if document.scan is None:
         return document
     low, high = extent(document.scan.cloud)
-    return set_clip_box(document, Box(_triple(low), _triple(high)))
+    return set_clip_box(document, ClipBox(_triple(low), _triple(high)))
 
 
 def clip_to_selection(document: Document) -> Document:
@@ -202,16 +202,16 @@ def clip_to_selection(document: Document) -> Document:
             return document
         points = np.concatenate([_outline(e, 0.0, e.axis.length) for e in chosen])
     low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
-    return set_clip_box(document, Box(_triple(low), _triple(high)))
+    return set_clip_box(document, ClipBox(_triple(low), _triple(high)))
 
 
-def set_clip_box(document: Document, box: Box) -> Document:
+def set_clip_box(document: Document, box: ClipBox) -> Document:
     """Clip to a box; it keeps a centimetre along each axis."""
     is_inverted = box.is_inverted
     low, high = np.array(box.low), np.array(box.high)
     low, high = np.minimum(low, high), np.maximum(low, high)
     high = np.maximum(high, low + SMALLEST_BOX)
-    return set_view(document, clip_box=Box(_triple(low), _triple(high), is_inverted))
+    return set_view(document, clip_box=ClipBox(_triple(low), _triple(high), is_inverted))
 
 
 @cached_with_owner(maxsize=2)

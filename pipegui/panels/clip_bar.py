@@ -8,7 +8,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QLayout, QToolButton, QWidget
 
 from pipegui.i18n.texts import mark, tr
-from pipegui.model.document import Box
+from pipegui.model.document import ClipBox
 from pipegui.panels.widgets import Applying, QuietSpinBox
 from pipegui.states import descriptions
 from pipegui.states.view_state import ClipState
@@ -26,7 +26,7 @@ class ClipBar(QWidget):
     """World coordinates of the box's faces, and where else the box can go."""
 
     changed = Signal(object)
-    """The `Box` that was typed."""
+    """The `ClipBox` that was typed."""
     whole_requested = Signal()
     selection_requested = Signal()
     inverted = Signal()
@@ -36,7 +36,7 @@ class ClipBar(QWidget):
         super().__init__(parent)
         self._applying = Applying()
         self._origin = np.zeros(3)
-        self._box: Box | None = None
+        self._box: ClipBox | None = None
         row = self._row = QHBoxLayout(self)
         row.setSizeConstraint(QLayout.SizeConstraint.SetNoConstraint)
         row.setContentsMargins(theme.SPACING, 2, theme.SPACING, 2)

@@ -6,7 +6,7 @@ import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from pipecore.geometry import Array
-from pipegui.model.document import Box
+from pipegui.model.document import ClipBox
 from pipegui.scene import shapes
 from pipegui.scene.projection import Projection
 
@@ -18,12 +18,12 @@ MIDDLE = 6
 """Number of the handle that moves the whole box."""
 
 
-def corners(box: Box) -> Array:
+def corners(box: ClipBox) -> Array:
     """Low and high corner, shape (2, 3)."""
     return np.array([box.low, box.high])
 
 
-def handles(box: Box) -> Array:
+def handles(box: ClipBox) -> Array:
     """Middles of the faces (low x, high x, low y, …) and of the box, shape (7, 3)."""
     ends = corners(box)
     found = np.repeat([ends.mean(axis=0)], N_FACES + 1, axis=0)
@@ -33,7 +33,7 @@ def handles(box: Box) -> Array:
     return found
 
 
-def handle_at(box: Box, projection: Projection, cursor: tuple[float, float]) -> int:
+def handle_at(box: ClipBox, projection: Projection, cursor: tuple[float, float]) -> int:
     """Return the number of the handle under the cursor, the nearest to it, or -1."""
     pixels, _ = projection.to_screen(handles(box))
     away = np.linalg.norm(pixels - np.array(cursor), axis=1)
@@ -43,12 +43,12 @@ def handle_at(box: Box, projection: Projection, cursor: tuple[float, float]) -> 
 
 
 def drag(
-    box: Box,
+    box: ClipBox,
     handle: int,
     projection: Projection,
     start: tuple[float, float],
     cursor: tuple[float, float],
-) -> Box:
+) -> ClipBox:
     """Return `box` with a handle dragged from `start` to `cursor`, both in pixels.
 
     A face moves along its axis to where that is nearest to the cursor's ray; the middle
@@ -99,7 +99,9 @@ class BoxFrame:
         self._layer = layer
         self._actor: vtkActor | None = None
 
-    def show(self, box: Box | None, colour: tuple[float, float, float], width: float = 1.0) -> None:
+    def show(
+        self, box: ClipBox | None, colour: tuple[float, float, float], width: float = 1.0
+    ) -> None:
         """Draw the edges of a box, or none."""
         if self._actor is not None:
             self._layer.RemoveActor(self._actor)
@@ -116,7 +118,7 @@ class BoxFrame:
         self._layer.AddActor(self._actor)
 
 
-def is_shown(box: Box | None, point: Array) -> bool:
+def is_shown(box: ClipBox | None, point: Array) -> bool:
     """Return whether a point is seen: there is no box, or it is on the side that is shown."""
     if box is None:
         return True

@@ -9,7 +9,7 @@ from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Element, ElementKind, PointCloud, Result, Stack
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.colour_limits import height_limits, intensity_limits
-from pipegui.model.document import Box, ColourBy, ViewOptions
+from pipegui.model.document import ClipBox, ColourBy, ViewOptions
 from pipegui.model.stations import has_stations
 from pipegui.scene.colour_assignment import colour_apart, neighbouring_ids
 from pipegui.style.colour_maps import (
@@ -88,7 +88,7 @@ def visible_points(
     cloud: PointCloud,
     result: Result | None,
     hidden: frozenset[int],
-    box: Box | None = None,
+    box: ClipBox | None = None,
     rows: Rows = ALL,
     hidden_stations: frozenset[int] = frozenset(),
 ) -> NDArray[np.bool_] | None:
@@ -115,7 +115,7 @@ def _shown_stations(cloud: PointCloud, hidden: frozenset[int]) -> NDArray[np.boo
     return shown
 
 
-def points_in(box: Box, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
+def points_in(box: ClipBox, xyz: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Return which points lie in a box, or outside if it is inverted."""
     inside = np.empty(len(xyz), np.bool_)
     # In the points' own type: as float64 they would take room three times over.

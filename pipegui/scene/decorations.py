@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from pipecore.types import OWN_STACK, Element, Profiles
-from pipegui.model.document import Box, ColourBy
+from pipegui.model.document import ClipBox, ColourBy
 from pipegui.scene import shapes
 from pipegui.scene.colouring import (
     effective,
@@ -43,7 +43,7 @@ class Decorations:
         self._layers = layers
         self._groups: dict[str, list[tuple[vtkRenderer, vtkActor]]] = {}
         self._accented: dict[bool, vtkActor] = {}
-        self._box: Box | None = None
+        self._box: ClipBox | None = None
         self._scale = 1.0
         self.dark = False
         """Whether it is drawn on a dark background."""
@@ -85,7 +85,7 @@ class Decorations:
             actor.SetVisibility(is_for_moving == moving)
             actor.GetProperty().SetPointSize(scale * (point_px + 1))
 
-    def clip(self, box: Box | None) -> None:
+    def clip(self, box: ClipBox | None) -> None:
         """Draw only what lies in the box."""
         if box == self._box:
             return

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject, QPointF
 
 from pipecore.types import PointCloud
-from pipegui.model.document import Box
+from pipegui.model.document import ClipBox
 from pipegui.scene.canvas import Canvas
 from pipegui.scene.colouring import ALL, Rows, colour_points, visible_points
 from pipegui.scene.details import Finder, Mask, rows_in_picture, rows_of
@@ -93,7 +93,7 @@ class Layers(QObject):
         else:
             self._canvas.settle_again()
 
-    def _choose(self, cloud: PointCloud, box: Box | None) -> None:
+    def _choose(self, cloud: PointCloud, box: ClipBox | None) -> None:
         """Show the points that are to be seen; of a large cloud, a part until all are known."""
         self._subset.stop()
         self._search = None
@@ -143,7 +143,7 @@ class Layers(QObject):
         row = pick_point(parts, self._canvas.projection(), (position.x(), position.y()))
         return layer.cloud_index(row) if row >= 0 else -1
 
-    def begin_preview(self, box: Box) -> None:
+    def begin_preview(self, box: ClipBox) -> None:
         """Draw what is in the box, of points that need not have been in it before."""
         if self._state.cloud is not None:
             self.preview.seconds_per_point = self.whole.seconds_per_point
@@ -160,24 +160,26 @@ class Layers(QObject):
         for layer in (self.whole, self.close_up, self.preview):
             layer.forget()
 
-    def _visible(self, box: Box | None) -> Mask | None:
+    def _visible(self, box: ClipBox | None) -> Mask | None:
         state = self._state
         if state.cloud is None:
             return None
         return self._visible_rows(state.cloud, box)
 
-    def _visible_rows(self, cloud: PointCloud, box: Box | None, rows: Rows = ALL) -> Mask | None:
+    def _visible_rows(
+        self, cloud: PointCloud, box: ClipBox | None, rows: Rows = ALL
+    ) -> Mask | None:
         state, view = self._state, self._state.view
         return visible_points(
             cloud, state.result, view.hidden_elements, box, rows, view.hidden_stations
         )
 
-    def _is_whole(self, box: Box | None) -> bool:
+    def _is_whole(self, box: ClipBox | None) -> bool:
         """Return whether no point is left out."""
         view = self._state.view
         return box is None and not view.hidden_elements and not view.hidden_stations
 
-    def _sample(self, box: Box | None) -> NDArray[np.int32] | None:
+    def _sample(self, box: ClipBox | None) -> NDArray[np.int32] | None:
         """Return the visible rows of a sample small enough to take no time; None: all are."""
         state = self._state
         if state.cloud is None or self._is_whole(box):

@@ -15,7 +15,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPointGaussianMapper, vtkRen
 
 from pipecore.types import Floats, PointCloud
 from pipegui.model.cache import cached_with_owner
-from pipegui.model.document import Box
+from pipegui.model.document import ClipBox
 from pipegui.scene.spreading import Spread
 from pipegui.style.colour_maps import Colours
 
@@ -80,7 +80,7 @@ class PointLayer:
         self._colour: ColourRows | None = None
         self.slices: list[_Slice] = []
         self.seconds_per_point = 1e-7
-        self._clip: Box | None = None
+        self._clip: ClipBox | None = None
         self._is_drawing_new = False
         self.most = MOST_WITHOUT_CARD
         """At most so many points are drawn."""
@@ -167,7 +167,7 @@ class PointLayer:
             weight = 0.5 * min(self.n_shown / MOVING_LEVEL, 1)
             self.seconds_per_point += weight * (measured - self.seconds_per_point)
 
-    def clip(self, box: Box) -> None:
+    def clip(self, box: ClipBox) -> None:
         """Draw only what lies in the box; see `set_points` for leaving points out."""
         self._clip = box
         for part in self.slices:
@@ -232,7 +232,7 @@ OUTSIDE = """
 """In the place of VTK's own, which draws what is on the right side of all planes."""
 
 
-def set_planes(actor: vtkActor, box: Box | None) -> None:
+def set_planes(actor: vtkActor, box: ClipBox | None) -> None:
     """Let an actor draw only what the box shows."""
     mapper, shader = actor.GetMapper(), actor.GetShaderProperty()
     shader.ClearFragmentShaderReplacement(CLIP, True)

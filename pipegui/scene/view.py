@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from pipecore.geometry import Array
 from pipecore.types import NO_ID, PointCloud, Profiles
 from pipegui.i18n.texts import mark, tr
-from pipegui.model.document import Background, Box, ColourBy, Measurement, Tool, ViewOptions
+from pipegui.model.document import Background, ClipBox, ColourBy, Measurement, Tool, ViewOptions
 from pipegui.scene import clipping, shapes
 from pipegui.scene import pose as poses
 from pipegui.scene.aiming import aim
@@ -69,7 +69,7 @@ class SceneView(QWidget):
     """Number of the measurement whose cross was clicked."""
 
     clip_dragged = Signal(object)
-    """The clip `Box` after a handle was dragged."""
+    """The `ClipBox` after a handle was dragged."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -266,7 +266,7 @@ class SceneView(QWidget):
 
     # Clipping
 
-    def _show_box(self, box: Box | None) -> None:
+    def _show_box(self, box: ClipBox | None) -> None:
         tint = theme.colour("accent", dark=self._background in IS_DARK)
         width = FRAME_PX * self.devicePixelRatioF()
         self._frame.show(box, (tint.redF(), tint.greenF(), tint.blueF()), width)

@@ -31,7 +31,7 @@ from pipecore.types import (
 from pipegui.model import colour_limits, result_queries
 from pipegui.model.cache import cached_with_owner
 from pipegui.model.document import (
-    Box,
+    ClipBox,
     ColourBy,
     Document,
     Limits,
@@ -232,7 +232,7 @@ class ProfileBarState(_ComparedByParts):
 class ClipState:
     """The clip box in numbers."""
 
-    box: Box | None = None
+    box: ClipBox | None = None
     cloud: PointCloud | None = None
     has_selection: bool = False
 

@@ -10,7 +10,7 @@ from pipecore.geometry import LineAxis
 from pipecore.settings import Settings
 from pipecore.types import DeformationKind, Review, ReviewState, Verdict
 from pipegui.model import commands, selection_commands
-from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection
+from pipegui.model.document import ClipBox, ColourBy, Document, ProfileKey, Scan, Selection
 from pipegui.model.history import History
 from pipegui.model.selection import nearest_profile, selection_of_deformation, worst_deformation
 from tests.factories import make_scan
@@ -267,5 +267,5 @@ def test_that_reviews_follow_their_deformations_through_another_detection():
 
 
 def test_that_another_scan_is_not_clipped_by_the_box_of_the_first():
-    document = commands.set_view(DETECTED, clip_box=Box((0, 0, 0), (1, 1, 1)))
+    document = commands.set_view(DETECTED, clip_box=ClipBox((0, 0, 0), (1, 1, 1)))
     assert commands.open_scan(document, Scan("b", CLOUD)).view.clip_box is None

@@ -8,7 +8,7 @@ from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QInputDialog, QLineEdit, QMenu
 
 from pipecore.types import ReviewState
-from pipegui.model.document import Box, Scan, Selection
+from pipegui.model.document import ClipBox, Scan, Selection
 from pipegui.panels.project_model import NAME, NodeKind, ProjectModel
 from pipegui.states.view_state import TreeState
 from tests.factories import make_scan
@@ -291,7 +291,7 @@ def test_that_detecting_in_a_box_needs_a_box_and_keeps_the_rest(app, qtbot):
 
     pipe = app.session.document.result.element(7)
     low, high = sorted([tuple(pipe.axis.start - 0.3), tuple(pipe.axis.end + 0.3)])
-    app.session.do(commands.set_view, clip_box=Box(low, high))
+    app.session.do(commands.set_view, clip_box=ClipBox(low, high))
     others = [e for e in app.session.document.result.elements if e.element_id not in (7, 9)]
     app.window.actions_["detect_in_box"].trigger()
     qtbot.waitUntil(lambda: app.session.history.undo_text == "Detect again in the box")

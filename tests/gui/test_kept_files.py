@@ -14,7 +14,7 @@ from pipecore.io import read
 from pipecore.report import write_result_json
 from pipecore.settings import Settings
 from pipecore.types import ElementKind, ReviewState, Verdict
-from pipegui.model.document import Background, Box, ColourBy, Tool
+from pipegui.model.document import Background, ClipBox, ColourBy, Tool
 from pipegui.project.cloud_reference import CloudState
 from pipegui.project.project_file import read_project, write_project
 
@@ -62,7 +62,7 @@ def test_that_reviews_settings_and_view_are_in_the_project(document):
     view = document.view
     assert (view.colour_by, view.tool) == (ColourBy.DEVIATION, Tool.SELECT)
     assert view.background is Background.SYSTEM
-    assert view.clip_box == Box((-0.5, -0.5, -0.5), (2.0, 2.0, 1.0))
+    assert view.clip_box == ClipBox((-0.5, -0.5, -0.5), (2.0, 2.0, 1.0))
     assert (view.hidden_elements, view.pinned_elements) == (frozenset({5}), (1,))
 
 

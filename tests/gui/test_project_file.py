@@ -19,7 +19,15 @@ from pipecore.io import read, write_laz
 from pipecore.json_codec import from_plain, to_plain
 from pipecore.settings import InputSettings, LengthUnit, Settings
 from pipecore.types import Profiles, Result, Review, ReviewState
-from pipegui.model.document import Box, ColourBy, Document, ProfileKey, Scan, Selection, ViewOptions
+from pipegui.model.document import (
+    ClipBox,
+    ColourBy,
+    Document,
+    ProfileKey,
+    Scan,
+    Selection,
+    ViewOptions,
+)
 from pipegui.project import project_file
 from pipegui.project.cloud_reference import CloudState
 from pipegui.project.project_file import ProjectError, read_project, work_of, write_project
@@ -56,7 +64,7 @@ def document(stored):
         1,
         Settings().replace({"elements.min_radius_mm": 20.0, "stacks.directions": "0,0,1,30"}),
         Selection(1, 2, 1, ProfileKey(0, 3), frozenset({4})),
-        ViewOptions(ColourBy.HEIGHT, 4.5, frozenset({7}), clip_box=Box((0, 0, 0), (1, 2, 3.5))),
+        ViewOptions(ColourBy.HEIGHT, 4.5, frozenset({7}), clip_box=ClipBox((0, 0, 0), (1, 2, 3.5))),
     )
 
 
@@ -127,7 +135,7 @@ plain_views = st.builds(
     st.frozensets(st.integers(1, 99)),
     st.booleans(),
     clip_box=st.none()
-    | st.builds(Box, st.tuples(*[finite] * 3), st.tuples(*[finite] * 3), st.booleans()),
+    | st.builds(ClipBox, st.tuples(*[finite] * 3), st.tuples(*[finite] * 3), st.booleans()),
     height_limits=st.none() | st.tuples(finite, finite),
     intensity_limits=st.none() | st.tuples(finite, finite),
 )

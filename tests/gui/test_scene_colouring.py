@@ -7,7 +7,7 @@ from pipecore.editing import delete_elements
 from pipecore.formatting import MINUS
 from pipegui.model import commands, view_commands
 from pipegui.model.colour_limits import shown_limits
-from pipegui.model.document import Box, ColourBy, Document, Scan, ViewOptions
+from pipegui.model.document import ClipBox, ColourBy, Document, Scan, ViewOptions
 from pipegui.scene.colour_assignment import colour_apart, neighbouring_ids
 from pipegui.scene.colouring import (
     MUTED,
@@ -259,7 +259,7 @@ def test_that_colour_blind_people_tell_kinds_and_verdicts_apart(kind_of_sight):
 
 
 def test_that_points_outside_the_box_are_not_visible():
-    box = Box((0.5, 0.2, 0.1), (1.5, 1.6, 1.0))
+    box = ClipBox((0.5, 0.2, 0.1), (1.5, 1.6, 1.0))
     visible = visible_points(CLOUD, RESULT, frozenset({2}), box)
     inside = np.all((CLOUD.xyz >= box.low) & (CLOUD.xyz <= box.high), axis=1)
     assert np.array_equal(visible, inside & (RESULT.element_id != 2))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipegui.model.document import Box, ColourBy
+from pipegui.model.document import ClipBox, ColourBy
 from pipegui.scene import layers
 from pipegui.scene.colouring import points_in
 from pipegui.scene.point_layer import PointLayer
@@ -14,7 +14,7 @@ from tests.factories import make_scan
 from tests.gui.test_scene_view import STILL, scene_state, settle
 
 CLOUD, RESULT = make_scan(60_000)
-BOX = Box((0.4, 0.2, 0.2), (2.4, 1.8, 1.2))
+BOX = ClipBox((0.4, 0.2, 0.2), (2.4, 1.8, 1.2))
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication
 
 from pipegui.model import selection_commands, view_commands
-from pipegui.model.document import Box, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
+from pipegui.model.document import ClipBox, ColourBy, Document, Measurement, Scan, Tool, ViewOptions
 from pipegui.scene import clipping
 from pipegui.scene.measure_marks import lines_of
 from pipegui.scene.view import SceneView
@@ -153,7 +153,7 @@ def test_that_a_drag_still_orbits_while_measuring(desk, qtbot):
 
 # Clipping
 
-BOX = Box((0.4, 0.2, 0.2), (2.4, 1.8, 1.2))
+BOX = ClipBox((0.4, 0.2, 0.2), (2.4, 1.8, 1.2))
 
 
 def pixel_of(desk, handle):
@@ -197,7 +197,7 @@ def test_that_the_middle_handle_moves_the_box_in_the_picture(desk, qtbot):
 
 
 def test_that_while_a_face_is_dragged_points_beyond_the_old_box_come_back(desk, qtbot):
-    clip(desk, Box((0.4, 0.2, 0.2), (0.9, 0.8, 0.8)))
+    clip(desk, ClipBox((0.4, 0.2, 0.2), (0.9, 0.8, 0.8)))
     start = pixel_of(desk, 1)
     qtbot.mousePress(desk.scene.canvas, LEFT, pos=start)
     for i in range(1, 6):
@@ -246,7 +246,7 @@ def test_that_axes_and_labels_follow_an_inverted_box(desk):
     settle_without_points(desk)
     both = picture(desk.scene)
     peak = RESULT.deformation(1).peak
-    box = Box(tuple((peak - 0.3).tolist()), tuple((peak + 0.3).tolist()))
+    box = ClipBox(tuple((peak - 0.3).tolist()), tuple((peak + 0.3).tolist()))
     drawn = []
     for is_inverted in (False, True):
         desk.do(view_commands.set_clip_box, replace(box, is_inverted=is_inverted))
@@ -283,7 +283,7 @@ def test_that_overlays_are_clipped_with_the_points(desk):
     desk.do(lambda d: view_commands.set_view(d, show_labels=True))
     assert len(desk.scene.overlay.labels) == 4
     peak = RESULT.deformation(1).peak
-    clip(desk, Box(tuple((peak - 0.2).tolist()), tuple((peak + 0.2).tolist())))
+    clip(desk, ClipBox(tuple((peak - 0.2).tolist()), tuple((peak + 0.2).tolist())))
     assert [label.deformation_id for label in desk.scene.overlay.labels] == [1]
     outside = picture(desk.scene)[:60, 300:]
     assert np.ptp(outside[..., 0]) < 40
@@ -306,7 +306,9 @@ def test_that_the_box_can_hold_the_selection_or_the_scan():
 
 def test_that_a_box_never_vanishes():
     document = Document(scans=(Scan("plant.laz", CLOUD),))
-    box = view_commands.set_clip_box(document, Box((1.0, 5.0, 0.0), (1.0, 2.0, 3.0))).view.clip_box
+    box = view_commands.set_clip_box(
+        document, ClipBox((1.0, 5.0, 0.0), (1.0, 2.0, 3.0))
+    ).view.clip_box
     assert box.low == (1.0, 2.0, 0.0)
     assert box.high == pytest.approx((1.01, 5.0, 3.0))
 

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QApplication
 from pipecore.types import PointCloud
 from pipegui.model.document import (
     Background,
-    Box,
+    ClipBox,
     ColourBy,
     Document,
     Scan,
@@ -360,7 +360,7 @@ def test_that_points_outside_the_clip_box_are_neither_drawn_nor_picked(scene, qt
     (index, *_) = seen_points(scene, 2)
     position = on_screen(scene, index)
     x = float(CLOUD.xyz[index, 0])
-    box = Box((x + 0.05, -1.0, -1.0), (5.0, 5.0, 5.0))
+    box = ClipBox((x + 0.05, -1.0, -1.0), (5.0, 5.0, 5.0))
     scene.apply(scene_state(view=replace(STILL, clip_box=box)))
     settle(qtbot, scene)
     assert len(scene.points) == (CLOUD.xyz[:, 0] >= x + 0.05).sum()

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 
 from pipecore.types import PointCloud
-from pipegui.model.document import Box
+from pipegui.model.document import ClipBox
 from pipegui.panels.clip_bar import ClipBar
 from pipegui.states.view_state import ClipState
 from tests.factories import make_cloud
@@ -79,7 +79,7 @@ def test_that_the_numbers_of_the_clip_box_are_whole_in_a_narrow_bar_too(qtbot, w
     qtbot.addWidget(bar)
     cloud = PointCloud(np.array([432_100.0, 6_201_870.0, 110.0]), np.zeros((1, 3), np.float32))
     bar.resize(width, 40)
-    bar.apply(ClipState(Box((0.91, 0.32, 0.42), (1.34, 0.66, 0.78)), cloud, has_selection=True))
+    bar.apply(ClipState(ClipBox((0.91, 0.32, 0.42), (1.34, 0.66, 0.78)), cloud, has_selection=True))
     QApplication.processEvents()
     assert (bar.width(), bar.minimumSizeHint().width() < width) == (width, True)
     for field in (field for pair in bar.ends for field in pair):

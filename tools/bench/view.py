@@ -63,7 +63,7 @@ def measure(n: int) -> dict[str, float]:
     from PySide6.QtCore import QPointF
     from PySide6.QtWidgets import QApplication
 
-    from pipegui.model.document import Box, ColourBy, Document, Scan, ViewOptions
+    from pipegui.model.document import ClipBox, ColourBy, Document, Scan, ViewOptions
     from pipegui.scene import clipping
     from pipegui.scene import pose as poses
     from pipegui.scene.picking import warm_up
@@ -143,7 +143,7 @@ def measure(n: int) -> dict[str, float]:
     found["recolour, CPU"] = 1000 * (time.thread_time() - computing)
     rest()
     low, high = cloud.xyz[:100_000].min(axis=0), cloud.xyz[:100_000].max(axis=0)
-    box = Box(tuple(low.tolist()), tuple(high.tolist()))
+    box = ClipBox(tuple(low.tolist()), tuple(high.tolist()))
     computing = time.thread_time()
     found["clip"] = until_drawn(lambda: show(colour_by=ColourBy.HEIGHT, clip_box=box))
     found["clip, CPU"] = 1000 * (time.thread_time() - computing)

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from pipecore import detect
 from pipecore.geometry import Array
-from pipecore.simulate import Scan, TrueDeformation, random_pipe, random_scene, scan
+from pipecore.simulate import SimulatedScan, TrueDeformation, random_pipe, random_scene, scan
 from pipecore.simulate.scoring import score
 from pipecore.types import DeformationKind, ElementKind
 from tools.study.store import measured
@@ -35,7 +35,7 @@ class Pipe:
     seed: int
     kind: DeformationKind | None
 
-    def scan(self) -> Scan:
+    def scan(self) -> SimulatedScan:
         rng = np.random.default_rng([self.seed, 77])
         is_oval = self.kind is DeformationKind.OVALITY
         arc = float(rng.choice(WIDE_ARCS if is_oval else ARCS))
@@ -135,7 +135,7 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, DeformationKind) else value
 
 
-def read_by_cylinder(scanned: Scan, true: TrueDeformation) -> Row:
+def read_by_cylinder(scanned: SimulatedScan, true: TrueDeformation) -> Row:
     """What a cylinder and the distances of the points from it tell of a dent.
 
     The way of other programs: a cylinder by consensus (least squares on the points within

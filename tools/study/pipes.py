@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from pipecore import detect
 from pipecore.ellipses import radius_sd_factor
-from pipecore.simulate import Scan, Scene, random_pipe, scan
+from pipecore.simulate import Scene, SimulatedScan, random_pipe, scan
 from pipecore.simulate.scoring import score
 from pipecore.types import ElementKind
 from tools.study.store import measured, put_image, table
@@ -130,12 +130,12 @@ def _measure(case: Case, seed: int) -> dict[str, Any]:
     }
 
 
-def _own_points(scanned: Scan) -> np.ndarray:
+def _own_points(scanned: SimulatedScan) -> np.ndarray:
     """The pipe's own points, known from the truth."""
     return scanned.cloud.xyz[scanned.truth_element == 1].astype(np.float64)
 
 
-def _peer_fit(scanned: Scan, seed: int) -> float:
+def _peer_fit(scanned: SimulatedScan, seed: int) -> float:
     """Radius by the package cylinder-fitting, which fits squared distances (Eberly)."""
     points = np.random.default_rng(seed).permutation(_own_points(scanned))[:N_PEER_POINTS]
     x, y, z = scanned.truth.elements[0].axis.tangent(0.0)
@@ -143,7 +143,7 @@ def _peer_fit(scanned: Scan, seed: int) -> float:
     return float(cylinder_fitting.fit(list(points), [start])[2])
 
 
-def _plain_fit(scanned: Scan, radius: float) -> float:
+def _plain_fit(scanned: SimulatedScan, radius: float) -> float:
     """Radius of the orthogonal least-squares cylinder of just the pipe's own points."""
     points = _own_points(scanned)
     axis = scanned.truth.elements[0].axis

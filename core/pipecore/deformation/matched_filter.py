@@ -24,7 +24,7 @@ MIN_POINTS = 5
 
 
 @dataclass(frozen=True)
-class Candidate:
+class BumpCandidate:
     """A place where a bump of a certain size stands out.
 
     `length` and `width` are the extents of the filter that saw it best.
@@ -67,7 +67,7 @@ class MatchedFilter:
             grid, weight, allowed, tuple(SizeFilter.of(grid, weight, count, size) for size in wide)
         )
 
-    def find(self, deviation: Array, contour_sd: Array, threshold: float) -> list[Candidate]:
+    def find(self, deviation: Array, contour_sd: Array, threshold: float) -> list[BumpCandidate]:
         """Find bumps and dents above `threshold` times their noise, strongest first.
 
         Parameters
@@ -95,7 +95,7 @@ class MatchedFilter:
             heights.append(height)
             scores.append(z)
 
-        found: list[Candidate] = []
+        found: list[BumpCandidate] = []
         free = self.allowed.copy()
         peaks = [kernels.strongest(z, free) for z in scores]
         while peaks:
@@ -109,7 +109,7 @@ class MatchedFilter:
                 break
             size = self.filters[best].size
             found.append(
-                Candidate(
+                BumpCandidate(
                     float(grid.chainages[row]),
                     float(grid.clocks[column]),
                     size,

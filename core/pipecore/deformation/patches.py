@@ -8,7 +8,7 @@ from pipecore.deformation.bump import TYPICAL_EXTENT, Bump, fit_bump
 from pipecore.deformation.contour import Contour, fit_contour
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.element_surface import ElementSurface
-from pipecore.deformation.matched_filter import Candidate, MatchedFilter, disc
+from pipecore.deformation.matched_filter import BumpCandidate, MatchedFilter, disc
 from pipecore.deformation.unrolled_points import min_stretch, stretch
 from pipecore.geometry import Array
 from pipecore.types import Element
@@ -143,7 +143,7 @@ def _measure(
     surface: ElementSurface,
     cells: DeviationMap,
     contour: Contour,
-    seen: Candidate,
+    seen: BumpCandidate,
 ) -> Patch | None:
     grid, points = surface.grid, surface.points
     reach = 2.5 * max(seen.length, seen.width)

@@ -3,13 +3,14 @@
 pyproj knows them; it is imported for files that name one.
 """
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from pipecore.units import is_unit
 
 if TYPE_CHECKING:
     from pyproj import CRS
@@ -221,9 +222,7 @@ def _lengths(system: "CRS") -> tuple[Length | None, Length | None]:
 
 
 def _sound(length: Length | None) -> Length | None:
-    if length is None or not math.isfinite(length[1]) or not 1e-9 < length[1] < 1e9:
-        return None
-    return length
+    return length if length is not None and is_unit(length[1]) else None
 
 
 def _outermost_unit(text: str) -> Length | None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pipecore.io.crs import ReferenceSystem, from_wkt
 from pipecore.io.source import FieldInfo, ScanInfo
 from pipecore.types import Array, Field, PointCloud, Storage
-from pipecore.units import FileUnit
+from pipecore.units import FileUnit, is_unit
 
 KEY = "pipegui"
 
@@ -268,7 +268,7 @@ def _place(place: list[float] | None) -> Array:
 
 def _unit(row: list[Any]) -> FileUnit:
     name, metres, height_name, height_metres = row
-    if not all(1e-9 < m < 1e9 for m in (metres, height_metres)):
+    if not (is_unit(metres) and is_unit(height_metres)):
         raise ValueError("no unit of length")
     return FileUnit(str(name), float(metres), str(height_name), float(height_metres))
 

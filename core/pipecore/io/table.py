@@ -171,7 +171,7 @@ def parse_rows(lines: list[str], dialect: Dialect, columns: Sequence[int] | None
 
 
 @dataclass
-class Table:
+class TextTable:
     """The rows of numbers that follow in an open file.
 
     Parameters

@@ -40,7 +40,7 @@ POINTS_AT_ONCE = 10_000_000
 
 
 @dataclass(frozen=True)
-class Column:
+class PageColumn:
     """A column of a table on the page."""
 
     title: str
@@ -122,22 +122,22 @@ def _own_settings(result: Result) -> Iterator[str]:
 
 def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]:
     columns = [
-        Column("#"),
-        Column("Element", numeric=False),
-        Column("Kind", numeric=False),
-        Column("Verdict", numeric=False),
-        Column("Depth (mm)"),
-        Column("% OD"),
-        Column("Ovality (%)"),
-        Column("Chainage (m)"),
-        Column("Clock"),
-        Column("Length × width (mm)"),
-        Column(f"Position x, y, z ({place.unit})"),
-        Column("Remarks", numeric=False),
+        PageColumn("#"),
+        PageColumn("Element", numeric=False),
+        PageColumn("Kind", numeric=False),
+        PageColumn("Verdict", numeric=False),
+        PageColumn("Depth (mm)"),
+        PageColumn("% OD"),
+        PageColumn("Ovality (%)"),
+        PageColumn("Chainage (m)"),
+        PageColumn("Clock"),
+        PageColumn("Length × width (mm)"),
+        PageColumn(f"Position x, y, z ({place.unit})"),
+        PageColumn("Remarks", numeric=False),
     ]
     has_strain = any(np.isfinite(d.strain) for d in result.deformations)
     if has_strain:
-        columns.append(Column("Strain (%), indicative"))
+        columns.append(PageColumn("Strain (%), indicative"))
     rows = []
     for d in by_verdict(result):
         element = result.element(d.element_id)
@@ -199,17 +199,17 @@ def _whole_mm(metres: float) -> str:
 
 def _element_table(result: Result) -> dict[str, Any]:
     columns = [
-        Column("Element", numeric=False),
-        Column("Run"),
-        Column("Verdict", numeric=False),
-        Column("Nominal size", numeric=False),
-        Column("Radius (mm)"),
-        Column("Bend (mm, °)"),
-        Column("Length (m)"),
-        Column("Arc seen (°)"),
-        Column("Residual (mm)"),
-        Column("Ovality (%)"),
-        Column("Straightness (mm)"),
+        PageColumn("Element", numeric=False),
+        PageColumn("Run"),
+        PageColumn("Verdict", numeric=False),
+        PageColumn("Nominal size", numeric=False),
+        PageColumn("Radius (mm)"),
+        PageColumn("Bend (mm, °)"),
+        PageColumn("Length (m)"),
+        PageColumn("Arc seen (°)"),
+        PageColumn("Residual (mm)"),
+        PageColumn("Ovality (%)"),
+        PageColumn("Straightness (mm)"),
     ]
     worst = {
         e.element_id: min(

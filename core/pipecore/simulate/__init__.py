@@ -6,15 +6,15 @@ from pipecore.errors import SceneError
 from pipecore.resources import resource
 from pipecore.simulate.pipes import random_pipe
 from pipecore.simulate.plants import random_scene
-from pipecore.simulate.scanner import Scan, scan
+from pipecore.simulate.scanner import SimulatedScan, scan
 from pipecore.simulate.scene import Scanner, Scene
 from pipecore.simulate.scenefile import load_scene, save_scene
 from pipecore.simulate.truth import TrueDeformation, TrueElement, Truth, load_truth
 
 __all__ = [
-    "Scan",
     "Scanner",
     "Scene",
+    "SimulatedScan",
     "TrueDeformation",
     "TrueElement",
     "Truth",

@@ -26,7 +26,7 @@ from pipecore.simulate.scene import (
     Straight,
     Tee,
 )
-from pipecore.simulate.surface import KIND_OF_SPEC, Surface, kink_height
+from pipecore.simulate.surface import KIND_OF_SPEC, DeformedSurface, kink_height
 from pipecore.simulate.truth import TrueDeformation, TrueElement
 from pipecore.types import ElementKind
 
@@ -37,7 +37,7 @@ GASKET = 0.003
 class PlacedElement:
     """An element with the surface that is scanned and what it is made of."""
 
-    surface: Surface
+    surface: DeformedSurface
     material: str
     n_bolts: int = 0
 
@@ -233,7 +233,7 @@ class _Chain:
             centre,
         )
         self.elements.append(
-            PlacedElement(Surface(element, deformations), self.run.material, n_bolts)
+            PlacedElement(DeformedSurface(element, deformations), self.run.material, n_bolts)
         )
 
     def _branch_off(self, branch: Branch, middle: Array, where: str) -> None:
@@ -278,7 +278,7 @@ def _check_deformation(spec: DeformationSpec, axis: Axis, radius: float, where: 
 
 
 def _true_deformation(
-    deformation_id: int, surface: Surface, spec: DeformationSpec
+    deformation_id: int, surface: DeformedSurface, spec: DeformationSpec
 ) -> TrueDeformation:
     element = surface.element
     length_of_axis, circumference = element.axis.length, 2 * np.pi * element.radius

@@ -28,7 +28,7 @@ AMBIENT = 0.45
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class SimulatedScan:
     """A simulated scan with what is true about it.
 
     Parameters
@@ -61,7 +61,7 @@ class _Points:
     rgb: NDArray[np.uint8]
 
 
-def scan(scene: Scene, *, progress: Progress | None = None) -> Scan:
+def scan(scene: Scene, *, progress: Progress | None = None) -> SimulatedScan:
     """Scan `scene` from all its stations. The same scene gives the same scan.
 
     Parameters
@@ -72,7 +72,7 @@ def scan(scene: Scene, *, progress: Progress | None = None) -> Scan:
 
     Returns
     -------
-    Scan
+    SimulatedScan
         The cloud, with the element and the station of each point, and the truth.
 
     Raises
@@ -112,7 +112,7 @@ def scan(scene: Scene, *, progress: Progress | None = None) -> Scan:
         placement.deformations(),
     )
     station_index = np.repeat(np.arange(len(views)), [len(v.xyz) for v in views])
-    return Scan(
+    return SimulatedScan(
         cloud,
         element,
         station_index.astype(np.uint8),

@@ -79,7 +79,7 @@ def ovality_weight(spec: Ovality, chainage: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class DeformedSurface:
     """The lateral surface of an element with its deformations."""
 
     element: TrueElement

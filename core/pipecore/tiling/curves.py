@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 BYTES_PER_POINT = 420
 """What cutting a downsampled point into a profile and fitting its curve takes at the most."""
-SORTING = 0.3
+SORTING_SHARE = 0.3
 """Share of the time that sorting points by profile takes."""
 CUT_ARRAYS = "surface", "normals", "spacing"
 """What the cutting of profiles looks at."""
@@ -82,7 +82,7 @@ def cut_in_batches(
     """
     store = engine.store
     begin, end = span
-    middle = begin + SORTING * (end - begin)
+    middle = begin + SORTING_SHARE * (end - begin)
     facts = Facts(tiled.surface.voxel, tiled.surface.noise)
     slabs = [(k, stack) for k in range(len(tiled.slabs))]
     sorted_slabs = engine.run(sort_slab, slabs, "profiles", progress, (begin, middle))

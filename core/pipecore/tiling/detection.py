@@ -11,7 +11,7 @@ from pipecore.rules import load_rule
 from pipecore.settings import Settings
 from pipecore.tiling import curves, slabs
 from pipecore.tiling.engine import start_engine
-from pipecore.tiling.memory import GIB, SHARE_OF_FREE, free_memory, keeping_within, tile_bytes
+from pipecore.tiling.memory import GIB, MAX_SHARE_OF_FREE, free_memory, keeping_within, tile_bytes
 from pipecore.tiling.parallel_reading import read_into_store
 from pipecore.tiling.store import temporary_store
 from pipecore.tiling.tiled_workspace import InTiles
@@ -58,7 +58,7 @@ def detect_in_tiles(
     """
     load_rule(settings.deformation.rule)  # what would fail at the end fails now
     beside = Path(settings.tiling.folder) if settings.tiling.folder else folder
-    limit = int(settings.tiling.memory_gib * GIB) or int(SHARE_OF_FREE * free_memory())
+    limit = int(settings.tiling.memory_gib * GIB) or int(MAX_SHARE_OF_FREE * free_memory())
     with (
         keeping_within(limit),
         temporary_store(beside) as store,

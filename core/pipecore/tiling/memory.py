@@ -15,16 +15,16 @@ from pipecore.settings import TilingSettings
 
 GIB = 2**30
 
-ONE_PIECE_BYTES = 150
+BYTES_PER_POINT_UNTILED = 150
 """What a detection in one piece may take a point; 110 to 120 were seen at 4 and 16 million."""
 BASE_BYTES = 400 * 2**20
 """The program itself with its libraries and compiled kernels."""
-KEPT_BYTES = 16
+KEPT_BYTES_PER_POINT = 16
 """What a point costs whatever the tiles: tables of cells, flags, lists of elements' points."""
-TEXT_BYTES = 25
+TEXT_BYTES_PER_POINT = 25
 """A point takes at least about this much in a file that does not say how many it holds."""
-SHARE_OF_FREE = 2 / 3
-SMALLEST_TILE = 32 * 2**20
+MAX_SHARE_OF_FREE = 2 / 3
+MIN_TILE_BYTES = 32 * 2**20
 """Tiles of less memory than this cost more than they save."""
 
 
@@ -80,12 +80,12 @@ def estimate_need(
     n_points = 0
     for path in paths:
         with identify(path).open(path, OpenOptions(columns)) as source:
-            n_most = source.n_points or path.stat().st_size // TEXT_BYTES
+            n_most = source.n_points or path.stat().st_size // TEXT_BYTES_PER_POINT
             if box is not None and source.count_within is not None:
                 n_most = source.count_within(corners_of(box))
             n_points += n_most
-    limit = int(settings.memory_gib * GIB) or int(SHARE_OF_FREE * free_memory())
-    return Need(n_points, BASE_BYTES + ONE_PIECE_BYTES * n_points, limit)
+    limit = int(settings.memory_gib * GIB) or int(MAX_SHARE_OF_FREE * free_memory())
+    return Need(n_points, BASE_BYTES + BYTES_PER_POINT_UNTILED * n_points, limit)
 
 
 def free_memory() -> int:
@@ -97,13 +97,13 @@ def free_memory() -> int:
 
 def tile_bytes(n_points: int, limit: int, n_at_once: int) -> int:
     """Memory that one of several tiles may take beside what is always there."""
-    left = limit - BASE_BYTES - KEPT_BYTES * n_points
-    return max(SMALLEST_TILE, math.floor(left / n_at_once))
+    left = limit - BASE_BYTES - KEPT_BYTES_PER_POINT * n_points
+    return max(MIN_TILE_BYTES, math.floor(left / n_at_once))
 
 
 POLL_SECONDS, POLL_SECONDS_IN_VAIN = 0.1, 2.0
 """Between two readings of the memory in use, and after one that could not be lowered."""
-FULL_SHARE = 0.8
+MAX_USED_SHARE = 0.8
 """From this share of the limit on, pages of files are given back."""
 
 
@@ -123,10 +123,10 @@ def keeping_within(limit: int) -> Iterator[None]:
         pause = POLL_SECONDS
         while not is_over.wait(pause):
             pause = POLL_SECONDS
-            if process.memory_info().rss > FULL_SHARE * limit:
+            if process.memory_info().rss > MAX_USED_SHARE * limit:
                 drop_pages()
                 trim()
-                if process.memory_info().rss > FULL_SHARE * limit:
+                if process.memory_info().rss > MAX_USED_SHARE * limit:
                     pause = POLL_SECONDS_IN_VAIN
 
     watch = threading.Thread(target=look, name="pipecore memory", daemon=True)

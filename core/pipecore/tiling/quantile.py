@@ -9,7 +9,7 @@ from pipecore.progress import Progress, in_chunks
 
 Array = NDArray[np.float64]
 
-BLOCK = 2_000_000
+VALUES_AT_A_TIME = 2_000_000
 MAX_SORTED_VALUES = 2_000_000
 """Values that may be sorted in memory."""
 N_BINS = 4096
@@ -71,7 +71,7 @@ def quantile(
 
 
 def _known(values: Array, stage: str, progress: Progress) -> Iterator[Array]:
-    for start, stop in in_chunks(len(values), BLOCK, stage, progress):
+    for start, stop in in_chunks(len(values), VALUES_AT_A_TIME, stage, progress):
         block = values[start:stop]
         block = block[~np.isnan(block)]
         if len(block):

@@ -31,11 +31,11 @@ Array = NDArray[np.float64]
 Rows = tuple[int, int]
 """A range of rows: the first, and the one behind the last."""
 
-PART = 1_000_000
+POINTS_AT_A_TIME = 1_000_000
 """Points that are looked at together before they are sorted into slabs."""
 BYTES_PER_POINT = 260
 """What thinning a point or fitting a plane to a downsampled point takes at the most."""
-MARGIN = int(np.ceil(WIDEST_NEIGHBOURHOOD)) + 1
+MARGIN_PLANES = int(np.ceil(WIDEST_NEIGHBOURHOOD)) + 1
 """Planes on either side of a slab that its normals need."""
 
 
@@ -86,7 +86,7 @@ class TiledSurface:
 
 def parts_of(n_points: int) -> list[Rows]:
     """Ranges of rows of about equal size."""
-    n_parts = max(1, int(np.ceil(n_points / PART)))
+    n_parts = max(1, int(np.ceil(n_points / POINTS_AT_A_TIME)))
     bounds = np.linspace(0, n_points, n_parts + 1).astype(np.int64)
     return [(int(a), int(b)) for a, b in pairwise(bounds)]
 
@@ -177,9 +177,9 @@ def slab_bounds(
     for i, plane in enumerate(planes.tolist()):
         if firsts:
             begun = planes[firsts[-1]]
-            low = np.searchsorted(planes, begun - MARGIN)
-            high = np.searchsorted(planes, plane + MARGIN, side="right")
-            if plane - begun < MARGIN or upto[high] - upto[low] <= per_slab:
+            low = np.searchsorted(planes, begun - MARGIN_PLANES)
+            high = np.searchsorted(planes, plane + MARGIN_PLANES, side="right")
+            if plane - begun < MARGIN_PLANES or upto[high] - upto[low] <= per_slab:
                 continue
         firsts.append(i)
     return np.array(firsts)

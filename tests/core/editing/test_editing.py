@@ -11,7 +11,7 @@ from pipecore.catalogues import sizes_of
 from pipecore.errors import CancelledError, EditError
 from pipecore.pipeline import detect
 from pipecore.settings import Settings
-from pipecore.simulate import Scan, Scanner, Scene, scan
+from pipecore.simulate import Scanner, Scene, SimulatedScan, scan
 from pipecore.simulate.scene import Box, Dent, Elbow, Run, Straight
 from pipecore.types import NO_ID, OWN_STACK, DeformationKind, ElementKind, Result
 
@@ -46,7 +46,7 @@ def plant(seed: int) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def simulated(session_seed) -> Scan:
+def simulated(session_seed) -> SimulatedScan:
     return scan(plant(session_seed))
 
 

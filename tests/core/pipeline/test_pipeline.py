@@ -11,7 +11,7 @@ from pipecore.geometry import LineAxis
 from pipecore.io import read
 from pipecore.pipeline import STAGES, detect
 from pipecore.settings import Settings
-from pipecore.simulate import Scan, Scanner, Scene, scan
+from pipecore.simulate import Scanner, Scene, SimulatedScan, scan
 from pipecore.simulate.scene import Box, Elbow, Flange, Reducer, Run, Straight
 from pipecore.simulate.scoring import score
 from pipecore.types import NO_ID, ElementKind, PointCloud, Result
@@ -52,7 +52,7 @@ def plant(seed: int) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def simulated(session_seed) -> Scan:
+def simulated(session_seed) -> SimulatedScan:
     return scan(plant(session_seed))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipecore.errors import CancelledError, SceneError
-from pipecore.simulate import Scan, Scanner, Scene, random_pipe, scan
+from pipecore.simulate import Scanner, Scene, SimulatedScan, random_pipe, scan
 from pipecore.simulate.scene import Box, Bulge, Dent, DentShape, Plate, Run, Straight
 from pipecore.types import DeformationKind
 
@@ -25,7 +25,7 @@ PIPE = Run((-1.0, 0.0, 1.0), (1.0, 0.0, 0.0), 0.11, (Straight(2.0),))
 STATION = (0.1, -3.0, 1.4)
 
 
-def deviations(simulated: Scan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def deviations(simulated: SimulatedScan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Chainage, clock and radial deviation of the points on the first element."""
     element = simulated.truth.elements[0]
     points = simulated.cloud.xyz[simulated.truth_element == 1].astype(np.float64)

@@ -7,7 +7,7 @@ import pytest
 
 from pipecore.geometry import ArcAxis, LineAxis, surface_points
 from pipecore.settings import Settings
-from pipecore.simulate import Scan, Scene, scan
+from pipecore.simulate import Scene, SimulatedScan, scan
 from pipecore.simulate.scene import (
     Bow,
     Branch,
@@ -43,11 +43,11 @@ STATIONS = ((-1.0, -3.0, 1.5), (4.5, -2.0, 1.5), (1.0, 4.0, 1.8), (0.0, 1.0, 4.0
 
 
 @pytest.fixture(scope="module")
-def simulated() -> Scan:
+def simulated() -> SimulatedScan:
     return scan(Scene((RUN, BALL), STATIONS, (), Scanner(spacing=0.01), (5e5, 6e6, 100.0)))
 
 
-def perfect(simulated: Scan) -> Result:
+def perfect(simulated: SimulatedScan) -> Result:
     """A result that says all of the truth, about another origin."""
     truth = simulated.truth
     origin = truth.origin + np.array([3.0, -2.0, 1.0])
@@ -105,7 +105,7 @@ def with_element(result: Result, element_id: int, **changes: object) -> Result:
     )
 
 
-def test_that_the_truth_itself_is_perfect(simulated: Scan) -> None:
+def test_that_the_truth_itself_is_perfect(simulated: SimulatedScan) -> None:
     s = score(perfect(simulated), simulated.truth)
     assert s.recall == s.precision == s.kind_share() == 1.0
     assert s.visible_length > 5.0
@@ -121,7 +121,7 @@ def test_that_the_truth_itself_is_perfect(simulated: Scan) -> None:
     assert len(s.deformations) == 2
 
 
-def test_that_reversing_an_axis_changes_nothing(simulated: Scan) -> None:
+def test_that_reversing_an_axis_changes_nothing(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     turned = replace(
         result,
@@ -134,7 +134,7 @@ def test_that_reversing_an_axis_changes_nothing(simulated: Scan) -> None:
     assert s.recall == s.precision == s.kind_share() == 1.0
 
 
-def test_that_an_empty_result_recalls_nothing(simulated: Scan) -> None:
+def test_that_an_empty_result_recalls_nothing(simulated: SimulatedScan) -> None:
     s = score(replace(perfect(simulated), elements=(), deformations=()), simulated.truth)
     assert s.recall == 0.0
     assert np.isnan(s.precision)
@@ -143,7 +143,7 @@ def test_that_an_empty_result_recalls_nothing(simulated: Scan) -> None:
     assert {d.kind for d in s.missed_deformations} == {DeformationKind.DENT, DeformationKind.BOW}
 
 
-def test_that_a_missing_pipe_costs_its_visible_length(simulated: Scan) -> None:
+def test_that_a_missing_pipe_costs_its_visible_length(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     pipe = simulated.truth.element(3)
     visible = sum(b - a for a, b in pipe.visible_ranges())
@@ -160,7 +160,9 @@ def test_that_a_missing_pipe_costs_its_visible_length(simulated: Scan) -> None:
     ("offset", "is_found"),
     [(0.014, True), (0.019, False)],  # 0.15 r is 16.5 mm.
 )
-def test_that_an_axis_may_be_a_little_aside(simulated: Scan, offset: float, is_found: bool) -> None:
+def test_that_an_axis_may_be_a_little_aside(
+    simulated: SimulatedScan, offset: float, is_found: bool
+) -> None:
     result = perfect(simulated)
     axis = result.element(1).axis
     moved = replace(axis, start=axis.start + np.array([0.0, 0.0, offset]))
@@ -172,7 +174,7 @@ def test_that_an_axis_may_be_a_little_aside(simulated: Scan, offset: float, is_f
         assert errors[-1] == pytest.approx(offset)
 
 
-def test_that_wrong_radii_and_directions_are_not_real(simulated: Scan) -> None:
+def test_that_wrong_radii_and_directions_are_not_real(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     thick = score(with_element(result, 1, radius=0.125, radius_end=0.125), simulated.truth)
     assert thick.recall < 0.8
@@ -189,7 +191,7 @@ def test_that_wrong_radii_and_directions_are_not_real(simulated: Scan) -> None:
     assert s.precision == pytest.approx(1 - 0.6 / s.reported_length)
 
 
-def test_that_a_bowed_pipe_is_found_by_its_chord_and_by_its_bow(simulated: Scan) -> None:
+def test_that_a_bowed_pipe_is_found_by_its_chord_and_by_its_bow(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     bowed = next(d.element_id for d in result.deformations if d.kind is DeformationKind.BOW)
     axis = result.element(bowed).axis
@@ -201,7 +203,7 @@ def test_that_a_bowed_pipe_is_found_by_its_chord_and_by_its_bow(simulated: Scan)
         assert s.recall == s.precision == 1.0
 
 
-def test_that_telling_a_pipe_twice_is_told(simulated: Scan) -> None:
+def test_that_telling_a_pipe_twice_is_told(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     assert score(result, simulated.truth).doubled_length < 0.05
     twice = replace(result, elements=(*result.elements, result.element(3)))
@@ -210,7 +212,7 @@ def test_that_telling_a_pipe_twice_is_told(simulated: Scan) -> None:
     assert s.doubled_length == pytest.approx(1.0, abs=0.05)
 
 
-def test_that_a_gap_is_no_claim_and_prolonging_a_pipe_is(simulated: Scan) -> None:
+def test_that_a_gap_is_no_claim_and_prolonging_a_pipe_is(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     axis = result.element(8).axis
     assert isinstance(axis, LineAxis)
@@ -221,7 +223,7 @@ def test_that_a_gap_is_no_claim_and_prolonging_a_pipe_is(simulated: Scan) -> Non
     assert score(told, simulated.truth).precision == pytest.approx(1.0, abs=0.002)
 
 
-def test_that_a_bend_told_as_a_pipe_has_the_wrong_kind(simulated: Scan) -> None:
+def test_that_a_bend_told_as_a_pipe_has_the_wrong_kind(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     bend = next(e for e in result.elements if e.kind is ElementKind.TORUS)
     s = score(with_element(result, bend.element_id, kind=ElementKind.CYLINDER), simulated.truth)
@@ -234,7 +236,9 @@ def test_that_a_bend_told_as_a_pipe_has_the_wrong_kind(simulated: Scan) -> None:
     assert s.bend_radius_errors[bend.element_id] == pytest.approx(0.02)
 
 
-def test_that_a_pipe_told_through_its_flange_is_real_but_no_flange(simulated: Scan) -> None:
+def test_that_a_pipe_told_through_its_flange_is_real_but_no_flange(
+    simulated: SimulatedScan,
+) -> None:
     result = perfect(simulated)
     start, end = result.element(1).axis.start, result.element(3).axis.end
     through = replace(result.element(1), axis=LineAxis.between(start, end))
@@ -245,7 +249,7 @@ def test_that_a_pipe_told_through_its_flange_is_real_but_no_flange(simulated: Sc
     assert s.kinds_judged[ElementKind.FLANGE] == 1
 
 
-def test_that_deformations_are_matched_where_they_are(simulated: Scan) -> None:
+def test_that_deformations_are_matched_where_they_are(simulated: SimulatedScan) -> None:
     result = perfect(simulated)
     dent = result.deformations[0]
     axis, radius = result.element(1).axis, 0.11
@@ -274,7 +278,7 @@ def test_that_deformations_are_matched_where_they_are(simulated: Scan) -> None:
     assert not bulge.deformations[0].is_kind_right
 
 
-def test_that_hidden_and_shallow_deformations_may_be_missed(simulated: Scan) -> None:
+def test_that_hidden_and_shallow_deformations_may_be_missed(simulated: SimulatedScan) -> None:
     result = replace(perfect(simulated), deformations=())
     truth = simulated.truth
     hidden = tuple(replace(d, seen=0.2) for d in truth.deformations)
@@ -283,7 +287,7 @@ def test_that_hidden_and_shallow_deformations_may_be_missed(simulated: Scan) -> 
     assert [d.depth for d in strict.missed_deformations] == [0.012]
 
 
-def test_that_a_score_can_be_read(simulated: Scan) -> None:
+def test_that_a_score_can_be_read(simulated: SimulatedScan) -> None:
     text = str(score(perfect(simulated), simulated.truth))
     assert "recall 1.000" in text
     assert "dent → dent" in text

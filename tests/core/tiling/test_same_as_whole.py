@@ -65,7 +65,7 @@ def assert_same(found, expected):
 
 
 def test_that_tiles_find_the_same_as_the_whole(scanned, whole, monkeypatch):
-    monkeypatch.setattr(slabs, "PART", 7_000)
+    monkeypatch.setattr(slabs, "POINTS_AT_A_TIME", 7_000)
     cloud, expected = whole
     assert len(expected.elements) >= 4
     settings = Settings().replace(TILES)

@@ -19,9 +19,15 @@ from pipecore.progress import NoProgress
 from pipecore.settings import Settings, TilingSettings
 from pipecore.surface import WIDEST_NEIGHBOURHOOD, average_voxels, fit_planes
 from pipecore.tiling import detect_in_tiles, estimate_need, memory
-from pipecore.tiling.memory import BASE_BYTES, GIB, ONE_PIECE_BYTES, keeping_within, tile_bytes
+from pipecore.tiling.memory import (
+    BASE_BYTES,
+    BYTES_PER_POINT_UNTILED,
+    GIB,
+    keeping_within,
+    tile_bytes,
+)
 from pipecore.tiling.quantile import quantile
-from pipecore.tiling.slabs import MARGIN, parts_of, slab_bounds
+from pipecore.tiling.slabs import MARGIN_PLANES, parts_of, slab_bounds
 from pipecore.tiling.store import temporary_store
 from pipecore.types import PointCloud
 from tests.core.shapes import cloud_of, parents, plane, tube
@@ -91,14 +97,14 @@ def test_that_slabs_with_their_margins_hold_no_more_than_they_may(rng):
     assert len(firsts) > 5
     ends = [*firsts[1:], len(planes)]
     for first, end in zip(firsts, ends, strict=True):
-        low, high = planes[first] - MARGIN, planes[end - 1] + MARGIN
+        low, high = planes[first] - MARGIN_PLANES, planes[end - 1] + MARGIN_PLANES
         held = counts[(planes >= low) & (planes <= high)].sum()
-        assert held <= per_slab or planes[end - 1] - planes[first] < MARGIN
+        assert held <= per_slab or planes[end - 1] - planes[first] < MARGIN_PLANES
 
 
 def test_that_no_slab_is_thinner_than_its_margin():
     firsts = slab_bounds(np.arange(100), np.full(100, 1_000), 1)
-    assert (np.diff(firsts) == MARGIN).all()
+    assert (np.diff(firsts) == MARGIN_PLANES).all()
 
 
 @pytest.mark.parametrize("n", [1, 999, 10_000_001])
@@ -177,7 +183,7 @@ def test_that_the_need_is_told_from_the_headers_alone(scanned):
     need = estimate_need([scanned, scanned], TilingSettings(memory_gib=0.25))
     assert need.n_points == 2 * n
     assert need.limit == 0.25 * GIB
-    assert need.bytes_in_one_piece == BASE_BYTES + 2 * n * ONE_PIECE_BYTES
+    assert need.bytes_in_one_piece == BASE_BYTES + 2 * n * BYTES_PER_POINT_UNTILED
     assert need.is_too_large
     assert not estimate_need([scanned], TilingSettings(memory_gib=4.0)).is_too_large
     assert not estimate_need([scanned], TilingSettings()).is_too_large

@@ -32,7 +32,7 @@ from pipecore.robust import TUKEY_REACH, robust_sd, sample_evenly
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-SAME_RADIUS = 0.06
+MAX_RADIUS_DIFFERENCE = 0.06
 """Pipes joined by a bend are of one radius to within this share, and so is the bend."""
 MIN_TURN, MAX_TURN = np.deg2rad(6.0), np.deg2rad(135.0)
 MAX_SKEW = 0.2
@@ -41,7 +41,7 @@ BEND_RADII = np.geomspace(1.1, 11.0, 60)
 """Bend radii tried, in radii of the pipe."""
 OVERSHOOT_RADII = 1.5
 """A straight may reach this many radii into the bend."""
-N_STEPS = 6
+N_NEWTON_STEPS = 6
 """Rounds of Gauss and Newton; the residual is nearly linear in the bend radius."""
 MIN_POINTS, MIN_POINTS_ON_BEND = 15, 12
 """Points that a bend is fitted to, and those for which one is tried."""
@@ -150,11 +150,11 @@ def _may_meet(ends: list[StraightEnd]) -> Iterator[tuple[int, int]]:
         return
     point, radius = np.stack([e.point for e in ends]), np.array([e.radius for e in ends])
     # From an end to the corner, there and on to the other, and what the axes may miss by.
-    furthest = 2.0 * BEND_RADII[-1] * np.tan(MAX_TURN / 2) * (1.0 + SAME_RADIUS) * radius
+    furthest = 2.0 * BEND_RADII[-1] * np.tan(MAX_TURN / 2) * (1.0 + MAX_RADIUS_DIFFERENCE) * radius
     furthest += 2.0 * MAX_SKEW * radius + 0.01
     for a in range(len(ends) - 1):
         smaller = np.minimum(radius[a], radius[a + 1 :])
-        is_one_size = np.abs(radius[a] - radius[a + 1 :]) <= SAME_RADIUS * smaller
+        is_one_size = np.abs(radius[a] - radius[a + 1 :]) <= MAX_RADIUS_DIFFERENCE * smaller
         is_near = np.square(point[a + 1 :] - point[a]).sum(axis=1) < furthest[a] ** 2
         for b in (np.flatnonzero(is_one_size & is_near) + a + 1).tolist():
             yield a, b
@@ -165,7 +165,10 @@ def corner_between(
 ) -> tuple[int, Corner, float] | None:
     """The corner that two ends make: number of points on its bend, corner, bend radius."""
     smaller = min(one.radius, other.radius)
-    if one.which[0] == other.which[0] or abs(one.radius - other.radius) > SAME_RADIUS * smaller:
+    if (
+        one.which[0] == other.which[0]
+        or abs(one.radius - other.radius) > MAX_RADIUS_DIFFERENCE * smaller
+    ):
         return None
     turn = float(np.arccos(np.clip(-(one.outward @ other.outward), -1.0, 1.0)))
     if not MIN_TURN < turn < MAX_TURN:
@@ -297,7 +300,7 @@ def fit_bend(
         order = sample_evenly(np.lexsort(xyz.T), MAX_POINTS)
         xyz, normals = xyz[order], normals[order]
     scale, bend_sd = 3.0 * sigma, np.inf
-    for _ in range(N_STEPS):
+    for _ in range(N_NEWTON_STEPS):
         residual, slope, outward, in_bend = pipe_residuals(corner, bend_radius, radius, xyz)
         radial = np.abs(np.einsum("ij,ij->i", normals, outward)) > RADIAL_COS
         near = radial & (np.abs(residual) < TUKEY_REACH * scale)
@@ -315,7 +318,10 @@ def fit_bend(
         scale = min(scale, max(shown, 0.7 * scale, 1e-5))
         bend_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[0, 0]))
         radius_sd = float(scale * np.sqrt(np.linalg.inv(normal_matrix)[1, 1]))
-        if not 1.02 * radius < bend_radius or abs(radius / corner.radius - 1) > SAME_RADIUS:
+        if (
+            not 1.02 * radius < bend_radius
+            or abs(radius / corner.radius - 1) > MAX_RADIUS_DIFFERENCE
+        ):
             return None
     # The corner's own uncertainty moves the bend by as much, and its radius by far more.
     bend_sd = float(np.hypot(bend_sd, corner.sd / (1.0 / np.cos(corner.turn / 2) - 1.0)))

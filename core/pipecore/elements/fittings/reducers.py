@@ -38,9 +38,9 @@ MIN_LENGTH_RADII, MAX_LENGTH_RADII, MAX_GAP_RADII = 0.1, 5.0, 12.0
 hidden of them, in radii of its wider end."""
 OVERSHOOT_RADII = 1.0
 """A straight may reach so many radii too far, or end as much too early."""
-N_TRIED = 28
+N_PLACES_TRIED = 28
 """Places tried for either end; then again between those beside the best."""
-BETWEEN = 0.35
+MAX_OFFSET_RADII = 0.35
 """Ends of a straight that is part of a reducer are no further off its axis, in radii of its
 wider end."""
 MIN_FACING_COS = np.cos(np.deg2rad(50.0))
@@ -139,7 +139,7 @@ class RadiusStep:
             chainage.min() > -reach
             and chainage.max() < self.gap + reach
             and np.ptp(chainage) < MAX_LENGTH_RADII * self.wide
-            and off.max() < BETWEEN * self.wide
+            and off.max() < MAX_OFFSET_RADII * self.wide
         )
 
     def chainage(self, xyz: Array) -> Array:
@@ -230,7 +230,7 @@ def _best_ends(
 ) -> tuple[float, float]:
     """Chainages between which the cone leaves least of the points' distances."""
     best = (np.inf, low, high)
-    begins = ends = np.linspace(low, high, N_TRIED)
+    begins = ends = np.linspace(low, high, N_PLACES_TRIED)
     for _ in range(2):
         for begin in begins:
             lengths = (ends - begin) / step.wide
@@ -240,7 +240,7 @@ def _best_ends(
             left = np.square(np.minimum(step.off(xyz, begin, possible), band)).sum(axis=1)
             least = int(np.argmin(left))
             best = min(best, (float(left[least]), float(begin), float(possible[least])))
-        beside = (high - low) / (N_TRIED - 1) * np.linspace(-1.0, 1.0, 9)
+        beside = (high - low) / (N_PLACES_TRIED - 1) * np.linspace(-1.0, 1.0, 9)
         begins, ends = best[1] + beside, best[2] + beside
     return best[1], best[2]
 

@@ -16,11 +16,11 @@ from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.runs.ends import AxisSpan, LineIndex
 from pipecore.geometry import ArcAxis, LineAxis
 
-BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
+MIN_BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
 """A branch leaves its run at this angle or more."""
 MAX_SKEW = 0.25
 """The axes pass each other within this share of the run's radius."""
-ENDS_WITHIN = (0.5, 1.6)
+END_DISTANCE_RADII = (0.5, 1.6)
 """A branch ends where the run's surface is: so many of the run's radii from its axis."""
 MAX_GAP, MAX_FAR_SKEW = 4.0, 0.1
 """A branch whose end is hidden may end so many of its radii off, with a smaller skew."""
@@ -62,7 +62,7 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
             point = branch.axis.end if end else branch.axis.start
             tangent = branch.axis.tangent(branch.axis.length if end else 0.0)
             outward = tangent if end else -tangent
-            for j in lines.near(point, ENDS_WITHIN[1] * radii + MAX_GAP * branch.radii[end]):
+            for j in lines.near(point, END_DISTANCE_RADII[1] * radii + MAX_GAP * branch.radii[end]):
                 run = spans[j]
                 if i == j or not isinstance(run.axis, LineAxis):
                     continue
@@ -71,7 +71,7 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
                     continue
                 chainage, rho, _ = run.axis.pipe_coordinates(point[None])
                 beside = -0.5 * radius < chainage[0] < run.axis.length + 0.5 * radius
-                least, most = (r * radius for r in ENDS_WITHIN)
+                least, most = (r * radius for r in END_DISTANCE_RADII)
                 is_far = rho[0] > most
                 if is_far:
                     most = radius + (0.0 if (i, end) in met else MAX_GAP) * branch.radii[end]
@@ -82,7 +82,7 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
                 towards = run.axis.at(chainage[0]) - point
                 skew = abs(float(towards @ across)) / max(sine, 1e-9)
                 max_skew = MAX_FAR_SKEW if is_far else MAX_SKEW
-                if sine > BRANCH_SIN and skew < max_skew * radius and towards @ outward > 0:
+                if sine > MIN_BRANCH_SIN and skew < max_skew * radius and towards @ outward > 0:
                     # Where the axes meet, not where the branch ends, is a lateral's middle.
                     slope = float(outward @ run.axis.direction) / sine
                     middle = float(chainage[0]) + slope * float(rho[0])

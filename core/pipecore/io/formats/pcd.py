@@ -23,7 +23,7 @@ from pipecore.io.source import (
     truncated,
     truncated_note,
 )
-from pipecore.io.table import Table, sniff_dialect
+from pipecore.io.table import TextTable, sniff_dialect
 from pipecore.notes import Note
 from pipecore.types import Array
 
@@ -145,7 +145,7 @@ def _text_chunks(
     file.seek(start)
     ends = np.cumsum(header.counts)
     # Text carries more than a field's declared size: coordinates are taken as they stand.
-    table = Table(
+    table = TextTable(
         file,
         path,
         sniff_dialect(first_line),

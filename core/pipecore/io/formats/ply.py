@@ -29,7 +29,7 @@ from pipecore.io.source import (
     truncated_note,
 )
 from pipecore.io.storage import KEY, Extras, parse_extras
-from pipecore.io.table import Dialect, Table
+from pipecore.io.table import Dialect, TextTable
 from pipecore.notes import Note
 
 LONGEST_HEADER = 1_000_000
@@ -222,7 +222,7 @@ def _text_values(file: BinaryIO, path: Path, header: _Header) -> Iterator[Any]:
         return
     n_columns = len(vertex.names)
     n_lines = header.n_lines + sum(e.count for e in header.before)
-    table = Table(
+    table = TextTable(
         file, path, Dialect(), tuple(range(n_columns)), n_columns, n_lines, n_rows=vertex.count
     )
     n_read = 0

@@ -16,7 +16,7 @@ from pipecore.io.source import (
     truncated,
     truncated_note,
 )
-from pipecore.io.table import Table
+from pipecore.io.table import TextTable
 from pipecore.notes import Note
 
 
@@ -69,7 +69,7 @@ def _chunks(
     n_points: int | None = None,
 ) -> Iterator[Chunk]:
     with raise_read_errors(path, "text"):
-        table = Table(
+        table = TextTable(
             file,
             path,
             layout.dialect,
@@ -100,7 +100,7 @@ def _chunks(
             notes.append(truncated_note(path, announced, n_rows))
 
 
-def _more_fields(layout: Layout, table: Table) -> dict[str, int]:
+def _more_fields(layout: Layout, table: TextTable) -> dict[str, int]:
     """Names of the columns that have no role, and their places among those read."""
     taken = set(layout.columns.values())
     return {
