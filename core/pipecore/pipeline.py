@@ -19,6 +19,7 @@ from pipecore.segments import StackOverlay
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
 from pipecore.types import Deformation, Element, PointCloud, Profiles, Result
+from pipecore.unit_sense import unit_notes
 from pipecore.workspace import InMemory, Workspace, labels_to_full_cloud
 
 STAGES = {
@@ -142,7 +143,7 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
         deviation=measured.deviation,
         seconds=timer.seconds,
         unit=cloud.unit,
-        notes=cloud.notes,
+        notes=(*cloud.notes, *unit_notes(cloud, measured.elements, settings)),
     )
 
 

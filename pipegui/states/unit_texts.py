@@ -13,6 +13,7 @@ UNIT_NAMES: Mapping[LengthUnit, str] = {
     LengthUnit.AUTO: mark("As the file says"),
     LengthUnit.METRE: mark("Metres"),
     LengthUnit.MILLIMETRE: mark("Millimetres"),
+    LengthUnit.INCH: mark("Inches"),
     LengthUnit.FOOT: mark("Feet"),
     LengthUnit.US_SURVEY_FOOT: mark("US survey feet"),
 }

@@ -44,6 +44,7 @@ def run(args: argparse.Namespace, console: Console) -> None:
     threading.Thread(target=lambda: list(map(importlib.import_module, ahead)), daemon=True).start()
     with _detected(args, settings, console) as (cloud, result):
         notes = write_report(args.output, cloud, result, overwrite=args.overwrite, progress=console)
+        console.warn([n for n in result.notes if n not in cloud.notes])
         console.warn(notes)
 
     console.say(f"{summarise(result)}.")

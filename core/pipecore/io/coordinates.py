@@ -14,15 +14,22 @@ from pipecore.settings import LengthUnit
 from pipecore.types import Array
 from pipecore.units import FileUnit
 
-UNIT_LABELS = {"m": "metres", "mm": "millimetres", "ft": "feet", "us-ft": "US survey feet"}
+UNIT_LABELS = {
+    "m": "metres",
+    "mm": "millimetres",
+    "in": "inches",
+    "ft": "feet",
+    "us-ft": "US survey feet",
+}
 COARSE_STEP = 0.002
 """Steps from which on rounding is worth a word, metres: it adds an SD of 0.6 mm."""
 STEP_SAMPLE, STEP_RUN = 5_000, 250
 """About so many points show the steps of coordinates, so many of them consecutive."""
 FEWEST_GAPS = 8
 """Fewer different values may be multiples of a step by chance."""
-WIDEST_SPACING, NARROWEST_SPACING = 0.5, 2e-5
-"""Points of a scan of pipes are no further, and no nearer than this, metres."""
+WIDEST_SPACING, WIDEST_UNNAMED, NARROWEST_SPACING = 0.5, 0.2, 2e-5
+"""Points of a scan of pipes are no further (the second, where no reference system names the unit),
+and no nearer than this, metres."""
 WIDEST_DEGREES, STEEPEST = 0.01, 20.0
 """Coordinates without a system look like degrees if x and y spread over no more than the
 first (about a kilometre), and heights over at least so many times as much."""
@@ -145,7 +152,8 @@ def sense_notes(
                 height=float(extent[2]),
             ),
         )
-    if spacing > WIDEST_SPACING or 0 < spacing < NARROWEST_SPACING:
+    widest = WIDEST_SPACING if crs else WIDEST_UNNAMED
+    if spacing > widest or 0 < spacing < NARROWEST_SPACING:
         return (
             Note(
                 "If “{name}” is in {unit}, its points are {spacing:.2g} m apart and spread over "
@@ -154,7 +162,7 @@ def sense_notes(
                 unit=str(unit),
                 spacing=spacing,
                 extent=_rounded(float(np.max(extent * unit.factors))),
-                other="mm" if spacing > WIDEST_SPACING else "m",
+                other="mm" if spacing > widest else "m",
             ),
         )
     return ()

@@ -351,7 +351,7 @@ def odd_size_notes(
     """
     extent = np.sort((bounds[1] - bounds[0]) * cloud.unit.factors)[::-1]
     spacing = float(np.sqrt(extent[0] * max(extent[1], 1e-3 * extent[0]) / len(cloud)))
-    if 5 * coordinates.NARROWEST_SPACING < spacing < coordinates.WIDEST_SPACING / 5:
+    if 5 * coordinates.NARROWEST_SPACING < spacing < coordinates.WIDEST_UNNAMED / 5:
         spacing = float("nan")  # a rough one is enough, since it is not odd
     else:
         sample = cloud.xyz[: 5 * coordinates.STEP_SAMPLE].astype(np.float64)

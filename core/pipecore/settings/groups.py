@@ -14,13 +14,14 @@ class LengthUnit(StrEnum):
     """What the file's reference system names, else metres."""
     METRE = "m"
     MILLIMETRE = "mm"
+    INCH = "in"
     FOOT = "ft"
     US_SURVEY_FOOT = "us-ft"
 
     @property
     def metres(self) -> float:
         """Metres in one unit; AUTO has none (KeyError)."""
-        return {"m": 1.0, "mm": 1e-3, "ft": 0.3048, "us-ft": 1200 / 3937}[self.value]
+        return {"m": 1.0, "mm": 1e-3, "in": 0.0254, "ft": 0.3048, "us-ft": 1200 / 3937}[self.value]
 
 
 class FlaggedPoints(StrEnum):
