@@ -241,17 +241,19 @@ def _best_of_samples(points: Array) -> Array | None:
     rows = rng.random((N_SAMPLES, len(points))).argpartition(SAMPLE_SIZE, axis=1)[:, :SAMPLE_SIZE]
     starts = np.arange(0, (N_SAMPLES + 1) * SAMPLE_SIZE, SAMPLE_SIZE)
     fits = fit_direct_ellipses(ordered[rows].reshape(-1, 2), starts)
-    table = np.column_stack([fits.centre, fits.semi_major, fits.semi_minor, fits.angle])
-    table = table[np.isfinite(table).all(axis=1)]
-    if len(table) == 0:
+    is_ellipse = np.isfinite(fits.centre).all(axis=1) & np.isfinite(fits.semi_major)
+    is_ellipse &= np.isfinite(fits.semi_minor) & np.isfinite(fits.angle)
+    if not is_ellipse.any():
         return _direct(points)
+    centre, angle = fits.centre[is_ellipse], fits.angle[is_ellipse]
+    semi_major, semi_minor = fits.semi_major[is_ellipse], fits.semi_minor[is_ellipse]
     tested = ordered[:: max(1, len(points) // N_TEST_POINTS)]
-    x, y = (tested[:, None, i] - table[:, i] for i in (0, 1))
-    cos, sin = np.cos(table[:, 4]), np.sin(table[:, 4])
-    stretch = np.hypot((cos * x + sin * y) / table[:, 2], (cos * y - sin * x) / table[:, 3])
+    x, y = (tested[:, None, i] - centre[:, i] for i in (0, 1))
+    cos, sin = np.cos(angle), np.sin(angle)
+    stretch = np.hypot((cos * x + sin * y) / semi_major, (cos * y - sin * x) / semi_minor)
     off = np.abs(np.hypot(x, y) * (1 - 1 / np.maximum(stretch, 1e-9)))
-    best = table[np.argmin(np.median(off, axis=0))]
-    return to_parameters(best[:2], *best[2:])
+    best = np.argmin(np.median(off, axis=0))
+    return to_parameters(centre[best], semi_major[best], semi_minor[best], angle[best])
 
 
 def _least_squares(model: Model, points: Array, first: Array) -> _Fit | None:

@@ -6,6 +6,7 @@ growing size, from a few voxels up to the largest radius looked for.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,9 @@ MAX_MISS = 0.2
 """Normal lines pass the axis within this share of the points' distance from it."""
 PER_DIRECTION = 40
 """Directions whose components agree to one part in so many are taken together: 1.4°."""
-BLOCK, CELLS_AT_ONCE = 1_000_000, 20_000
+N_POINTS = 0
+"""Which of the sums of a cell, see `kernels.N_SUMS`, is the number of its points."""
+POINTS_AT_A_TIME, CELLS_AT_A_TIME = 1_000_000, 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +82,12 @@ def find_round_places(
     cells, sums = _sum_finest(surface, edge, low, progress)
     axes, counts = [], []
     while len(cells):
-        found = _axes_around(cells, sums, progress)
-        miss, distance = found[:, 3], found[:, 4]
+        around, n_points = _axes_around(cells, sums, progress), sums[:, N_POINTS]
         with np.errstate(invalid="ignore"):
-            is_round = (miss < MAX_MISS * distance) & (distance < max_radius) & (sums[:, 0] > 0)
-        axes.append(found[is_round, :3])
-        counts.append(sums[is_round, 0])
+            is_round = (around.miss < MAX_MISS * around.distance) & (n_points > 0)
+            is_round &= around.distance < max_radius
+        axes.append(around.axis[is_round])
+        counts.append(n_points[is_round])
         edge *= SCALE_RATIO
         if edge > widest:
             break
@@ -110,9 +113,12 @@ def _sum_finest(
     frame = GridFrame.of(surface.xyz, edge)
     counter = VoxelCounter(frame)
     sums = np.zeros((0, kernels.N_SUMS))
-    for start in range(0, len(surface.xyz), BLOCK):
+    for start in range(0, len(surface.xyz), POINTS_AT_A_TIME):
         progress.update("directions", 0.0)
-        xyz, normals = surface.xyz[start : start + BLOCK], surface.normals[start : start + BLOCK]
+        xyz, normals = (
+            surface.xyz[start : start + POINTS_AT_A_TIME],
+            surface.normals[start : start + POINTS_AT_A_TIME],
+        )
         cell = np.empty(len(xyz), np.int32)
         counter.add(xyz, 0, len(xyz), cell)
         new = np.zeros((counter.n_cells - len(sums), kernels.N_SUMS))
@@ -129,8 +135,24 @@ def _coarser(cells: NDArray[np.int64], sums: Array) -> tuple[NDArray[np.int64], 
     return merged, total
 
 
-def _axes_around(cells: NDArray[np.int64], sums: Array, progress: Progress) -> Array:
-    """Axis, misses and distance around each cell; see the kernel."""
+class _Axes(NamedTuple):
+    """What the normal lines around cells meet on; nan where they tell no axis.
+
+    Parameters
+    ----------
+    axis : ndarray, shape (k, 3)
+        Unit vectors.
+    miss, distance : ndarray, shape (k,)
+        Of the lines from the axis, and of the points from it, root mean squares, metres.
+    """
+
+    axis: Array
+    miss: Array
+    distance: Array
+
+
+def _axes_around(cells: NDArray[np.int64], sums: Array, progress: Progress) -> _Axes:
+    """Axes around cells; see the kernel."""
     low = cells.min(axis=0) - 2
     n_y, n_z = (int(n) for n in (cells.max(axis=0) - low + 3)[1:])
     i = cells - low
@@ -143,5 +165,5 @@ def _axes_around(cells: NDArray[np.int64], sums: Array, progress: Progress) -> A
             keys, sums, table, n_y, n_z, first, last, MIN_CURVED, MAX_OFF_AXIS, found
         )
 
-    for_chunks(work, len(keys), CELLS_AT_ONCE, "directions", progress)
-    return found
+    for_chunks(work, len(keys), CELLS_AT_A_TIME, "directions", progress)
+    return _Axes(found[:, :3], found[:, 3], found[:, 4])
