@@ -88,15 +88,48 @@ class Axis(Protocol):
         ...
 
     def at(self, chainage: ArrayLike) -> Array:
-        """Points on the axis at `chainage` (shape (n,) or scalar), shape (n, 3) or (3,)."""
+        """Points on the axis at `chainage` (shape (n,) or scalar), shape (n, 3) or (3,).
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres, shape (n,) or ().
+
+        Returns
+        -------
+        ndarray
+            Local coordinates, shape (n, 3) or (3,).
+        """
         ...
 
     def tangent(self, chainage: ArrayLike) -> Array:
-        """Unit tangents towards increasing chainage, shape (n, 3) or (3,)."""
+        """Unit tangents towards increasing chainage, shape (n, 3) or (3,).
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres, shape (n,) or ().
+
+        Returns
+        -------
+        ndarray
+            Shape (n, 3) or (3,).
+        """
         ...
 
     def frame(self, chainage: ArrayLike) -> tuple[Array, Array]:
-        """Unit vectors to 12:00 and to 3:00 at `chainage`, each (n, 3) or (3,)."""
+        """Unit vectors to 12:00 and to 3:00 at `chainage`, each (n, 3) or (3,).
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres, shape (n,) or ().
+
+        Returns
+        -------
+        up, aside : ndarray
+            Shape (n, 3) or (3,).
+        """
         ...
 
     @property
@@ -108,6 +141,16 @@ class Axis(Protocol):
         """Chainage, distance from the axis and clock angle of `points` (n, 3), each (n,).
 
         The chainage may lie outside 0 … length. Clock angles are in [0, 2π).
+
+        Parameters
+        ----------
+        points : ndarray
+            Local coordinates, shape (n, 3).
+
+        Returns
+        -------
+        chainage, distance, clock : ndarray
+            Metres, metres and radians, shape (n,).
         """
         ...
 
@@ -162,7 +205,17 @@ class LineAxis:
 
     @classmethod
     def between(cls, start: ArrayLike, end: ArrayLike) -> "LineAxis":
-        """Return the axis from one point to another."""
+        """Return the axis from one point to another.
+
+        Parameters
+        ----------
+        start, end : array_like
+            Local coordinates, shape (3,).
+
+        Returns
+        -------
+        LineAxis
+        """
         a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
         return cls(a, unit(b - a), float(np.linalg.norm(b - a)))
 
@@ -204,7 +257,12 @@ class LineAxis:
         return (offset @ self.direction, *_polar(offset @ up, offset @ right))
 
     def reversed(self) -> "LineAxis":
-        """The same axis from its other end."""
+        """The same axis from its other end.
+
+        Returns
+        -------
+        LineAxis
+        """
         return LineAxis(self.end, -self.direction, self.length)
 
 
@@ -308,7 +366,12 @@ class ArcAxis:
         return angle * self.bend_radius, rho, clock
 
     def reversed(self) -> "ArcAxis":
-        """The same axis from its other end."""
+        """The same axis from its other end.
+
+        Returns
+        -------
+        ArcAxis
+        """
         return ArcAxis(
             self.centre,
             -self.normal,

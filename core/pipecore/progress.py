@@ -12,7 +12,13 @@ class Progress(Protocol):
     """
 
     def update(self, stage: str, fraction: float) -> None:
-        """Show that `stage` (a short lower-case noun) is done to `fraction` (0 to 1)."""
+        """Show that `stage` (a short lower-case noun) is done to `fraction` (0 to 1).
+
+        Parameters
+        ----------
+        stage : str
+        fraction : float
+        """
         ...
 
 

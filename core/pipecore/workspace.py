@@ -90,7 +90,18 @@ class Workspace(Protocol):
         ...
 
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
-        """Downsample the cloud and estimate the normals of the downsampled points."""
+        """Downsample the cloud and estimate the normals of the downsampled points.
+
+        Parameters
+        ----------
+        settings : ThinningSettings
+        progress : Progress
+            May cancel.
+
+        Returns
+        -------
+        Surface
+        """
         ...
 
     def remove_planes(
@@ -118,6 +129,13 @@ class Workspace(Protocol):
         """Cut stacks, join the points of their profiles to curves and fit ellipses to these.
 
         Stack by stack: the curves of all together need more memory than the cloud.
+
+        Parameters
+        ----------
+        stacks : sequence of Stack
+        settings : Settings
+        progress : Progress
+            May cancel.
 
         Yields
         ------

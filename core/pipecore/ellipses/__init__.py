@@ -93,7 +93,16 @@ class Ellipses:
 
     @classmethod
     def concatenate(cls, tables: "Sequence[Ellipses]") -> "Ellipses":
-        """Return one table with the rows of all; at least one table."""
+        """Return one table with the rows of all; at least one table.
+
+        Parameters
+        ----------
+        tables : sequence of Ellipses
+
+        Returns
+        -------
+        Ellipses
+        """
         return cls(*(np.concatenate([getattr(t, f.name) for t in tables]) for f in fields(cls)))
 
 

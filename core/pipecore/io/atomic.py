@@ -18,6 +18,10 @@ from pipecore.errors import WriteError
 def write_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield the name under which to write a file; it takes the place of `path` when whole.
 
+    Parameters
+    ----------
+    path : path
+
     Raises
     ------
     WriteError

@@ -17,7 +17,17 @@ _lock = threading.Lock()
 
 
 def as_mapped(array: np.memmap[Any, Any]) -> NDArray[Any]:
-    """Take a mapped array as any other; `drop_pages` knows of it as long as it is there."""
+    """Take a mapped array as any other; `drop_pages` knows of it as long as it is there.
+
+    Parameters
+    ----------
+    array : memmap
+
+    Returns
+    -------
+    ndarray
+        The same memory.
+    """
     owner: Any = getattr(array, "_mmap", None)
     if owner is not None:
         with _lock:
@@ -26,7 +36,16 @@ def as_mapped(array: np.memmap[Any, Any]) -> NDArray[Any]:
 
 
 def is_mapped(array: NDArray[Any]) -> bool:
-    """Return whether an array is kept in a file."""
+    """Return whether an array is kept in a file.
+
+    Parameters
+    ----------
+    array : ndarray
+
+    Returns
+    -------
+    bool
+    """
     owner: Any = array
     while isinstance(owner, np.ndarray):
         owner = owner.base
@@ -48,6 +67,12 @@ def reserve(path: Path, n_bytes: int) -> None:
 
     Mapped files that merely promise their length end the process when the disk turns out
     to be full.
+
+    Parameters
+    ----------
+    path : Path
+        Made if it is not there.
+    n_bytes : int
 
     Raises
     ------
@@ -85,7 +110,17 @@ class MappedFile:
         self._row_shape = () if width is None else (width,)
 
     def resized(self, n_rows: int) -> NDArray[Any]:
-        """Return the array with so many rows; new ones are zero."""
+        """Return the array with so many rows; new ones are zero.
+
+        Parameters
+        ----------
+        n_rows : int
+
+        Returns
+        -------
+        ndarray
+            Shape (n_rows,) or (n_rows, width).
+        """
         shape = (n_rows, *self._row_shape)
         reserve(self._path, int(np.prod(shape)) * self._dtype.itemsize)
         if n_rows == 0:

@@ -180,7 +180,17 @@ def common_unit(
 
 
 def corners_of(box: Corners) -> Array:
-    """Lowest and highest corner of a box, shape (2, 3)."""
+    """Lowest and highest corner of a box, shape (2, 3).
+
+    Parameters
+    ----------
+    box : Corners
+        Two corners, each x, y, z.
+
+    Returns
+    -------
+    ndarray
+    """
     return np.sort(np.asarray(box, np.float64).reshape(2, 3), axis=0)
 
 

@@ -44,6 +44,10 @@ class Format:
         path : Path
         options : OpenOptions
 
+        Returns
+        -------
+        context manager of Source
+
         Raises
         ------
         ReadError
@@ -72,12 +76,22 @@ _FORMATS = (
 
 
 def formats() -> tuple[Format, ...]:
-    """Return all formats that can be read."""
+    """Return all formats that can be read.
+
+    Returns
+    -------
+    tuple of Format
+    """
     return _FORMATS
 
 
 def file_filter() -> str:
-    """Return the filter of a file dialog, such as “Point clouds (*.las …);;PLY (*.ply)”."""
+    """Return the filter of a file dialog, such as “Point clouds (*.las …);;PLY (*.ply)”.
+
+    Returns
+    -------
+    str
+    """
 
     def entry(label: str, endings: tuple[str, ...]) -> str:
         return f"{label} ({' '.join('*' + ending for ending in endings)})"
@@ -94,6 +108,14 @@ def file_filter() -> str:
 
 def identify(path: Path) -> Format:
     """Return the format of a file: by its first bytes, for text by its ending.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    Format
 
     Raises
     ------

@@ -61,11 +61,11 @@ class FileInfo:
         What the file calls the values of a point.
     crs : str
         The coordinate reference system's name, or "".
-    unit : FileUnit
-        Unit of the coordinates, as `pipecore.read` takes it.
     n_scans : int
     n_stations : int
         Scans whose scanner position is known.
+    unit : FileUnit
+        Unit of the coordinates, as `pipecore.read` takes it.
     stations : tuple of StationInfo
         Empty where nothing tells stations apart.
     left_out : mapping of str to int
@@ -110,6 +110,10 @@ def info(
         As for `pipecore.read`.
     progress : Progress, optional
         Told about the stage "reading"; may cancel.
+
+    Returns
+    -------
+    FileInfo
 
     Raises
     ------

@@ -58,6 +58,14 @@ class TextFormat:
     def parse(cls, text: str) -> "TextFormat":
         """Return the format that a text describes.
 
+        Parameters
+        ----------
+        text : str
+
+        Returns
+        -------
+        TextFormat
+
         Raises
         ------
         ReadError
@@ -97,7 +105,16 @@ class TextFormat:
         return "|".join(parts)
 
     def dialect(self, line: str) -> Dialect:
-        """Return how the values of a line of data are separated."""
+        """Return how the values of a line of data are separated.
+
+        Parameters
+        ----------
+        line : str
+
+        Returns
+        -------
+        Dialect
+        """
         found = sniff_dialect(line)
         if self.separator is not Separator.AUTO:
             found = _separated_by(self.separator, line)

@@ -66,7 +66,16 @@ class TextPreview:
 
 
 def is_text(path: str | os.PathLike[str]) -> bool:
-    """Return whether a file is read as text."""
+    """Return whether a file is read as text.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    bool
+    """
     try:
         return identify(Path(path)).module == "text"
     except ReadError:
@@ -105,6 +114,10 @@ def preview_text(path: str | os.PathLike[str], text_format: TextFormat) -> TextP
     path : path
     text_format : TextFormat
         How it is read; columns may still be missing.
+
+    Returns
+    -------
+    TextPreview
 
     Raises
     ------

@@ -80,7 +80,18 @@ class Curves:
         return np.repeat(np.arange(len(self)), np.diff(self.starts))
 
     def mid_plane(self, curves: NDArray[np.intp] | slice = slice(None)) -> NDArray[np.float64]:
-        """Distance of the profiles' mid-planes from the local zero along the direction."""
+        """Distance of the profiles' mid-planes from the local zero along the direction.
+
+        Parameters
+        ----------
+        curves : ndarray of intp or slice
+            Which curves; all if not given.
+
+        Returns
+        -------
+        ndarray
+            Metres, shape (n,).
+        """
         index = self.profile_index[curves].astype(np.float64)
         return self.stack.offset + (index + 0.5) * self.stack.width
 

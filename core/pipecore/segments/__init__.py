@@ -34,13 +34,27 @@ class StackOverlay:
             self._parents[start:stop] = np.arange(start, stop)
 
     def add(self, points: NDArray[np.int32], starts: NDArray[np.int64]) -> None:
-        """Join the points that share a curve: rows starts[c] … starts[c + 1] of `points`."""
+        """Join the points that share a curve: rows starts[c] … starts[c + 1] of `points`.
+
+        Parameters
+        ----------
+        points : ndarray of int32
+            Indices of points, one curve after another.
+        starts : ndarray of int64
+            Where each curve starts in `points`, with the end of the last, shape (n + 1,).
+        """
         disjoint_sets.unite_groups(points, starts, self._parents)
 
     def add_planes(self, start: int, plane: NDArray[np.int32]) -> None:
         """Join the points of each plane: `plane` has the numbers of those from `start` on.
 
         Numbers count from 0; points with lower ones are of no plane.
+
+        Parameters
+        ----------
+        start : int
+        plane : ndarray of int32
+            Number of each point's plane, shape (n,).
         """
         n_more = int(plane.max(initial=-1)) + 1 - len(self._first_of_plane)
         if n_more > 0:
@@ -49,7 +63,18 @@ class StackOverlay:
         disjoint_sets.unite_labelled(plane, start, self._first_of_plane, self._parents)
 
     def number_segments(self, progress: Progress = NoProgress()) -> NDArray[np.int32]:
-        """Return the segment of each point, 1 for the largest; `NO_ID` for points of none."""
+        """Return the segment of each point, 1 for the largest; `NO_ID` for points of none.
+
+        Parameters
+        ----------
+        progress : Progress
+            May cancel.
+
+        Returns
+        -------
+        ndarray of int32
+            Shape (n,).
+        """
         n = len(self._parents)
         progress.update("segments", 0.0)
         disjoint_sets.flatten(self._parents)

@@ -117,12 +117,30 @@ class Settings(Summarised):
         return changed or {"all": "defaults"}
 
     def get(self, key: str) -> Any:
-        """Return a value by its dotted key, such as "stacks.width_mm"."""
+        """Return a value by its dotted key, such as "stacks.width_mm".
+
+        Parameters
+        ----------
+        key : str
+
+        Returns
+        -------
+        object
+        """
         group, name = key.split(".")
         return getattr(getattr(self, group), name)
 
     def replace(self, changes: Mapping[str, Any]) -> "Settings":
         """Return settings with some values changed, by dotted key; text is converted.
+
+        Parameters
+        ----------
+        changes : mapping of str to object
+            New values by dotted key.
+
+        Returns
+        -------
+        Settings
 
         Raises
         ------
@@ -142,7 +160,12 @@ class Settings(Summarised):
         )
 
     def to_dict(self) -> dict[str, dict[str, Any]]:
-        """Return plain nested dicts of numbers, strings and lists."""
+        """Return plain nested dicts of numbers, strings and lists.
+
+        Returns
+        -------
+        dict
+        """
         result: dict[str, dict[str, Any]] = {}
         for key, _ in iterate_fields():
             group, name = key.split(".")
@@ -155,6 +178,15 @@ class Settings(Summarised):
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Settings":
         """Return settings from nested dicts; what is absent keeps its default.
+
+        Parameters
+        ----------
+        data : mapping
+            Groups by name, each a mapping of its fields.
+
+        Returns
+        -------
+        Settings
 
         Raises
         ------
@@ -169,12 +201,25 @@ class Settings(Summarised):
         return cls().replace(changes)
 
     def to_toml(self) -> str:
-        """Return the settings as TOML text."""
+        """Return the settings as TOML text.
+
+        Returns
+        -------
+        str
+        """
         return tomli_w.dumps(self.to_dict())
 
     @classmethod
     def from_toml(cls, path: Path) -> "Settings":
         """Read settings from a TOML file.
+
+        Parameters
+        ----------
+        path : Path
+
+        Returns
+        -------
+        Settings
 
         Raises
         ------

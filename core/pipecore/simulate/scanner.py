@@ -48,7 +48,12 @@ class SimulatedScan:
     truth: Truth
 
     def write_truth(self, path: Path) -> None:
-        """Write the truth as JSON; see `pipecore.simulate.load_truth`."""
+        """Write the truth as JSON; see `pipecore.simulate.load_truth`.
+
+        Parameters
+        ----------
+        path : Path
+        """
         self.truth.save(path)
 
 

@@ -55,7 +55,18 @@ class TrueElement:
     points_seen: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
 
     def radius_at(self, chainage: Array | float) -> Array:
-        """Undeformed radius about the axis at `chainage`."""
+        """Undeformed radius about the axis at `chainage`.
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres.
+
+        Returns
+        -------
+        ndarray
+            Metres, shape as of `chainage`.
+        """
         s = np.asarray(chainage, dtype=np.float64)
         if self.kind is ElementKind.SPHERE:
             return np.sqrt(np.maximum(self.radius**2 - (s - self.axis.length / 2) ** 2, 0.0))
@@ -68,6 +79,17 @@ class TrueElement:
         """Chainage ranges of which at least `min_arc` and `min_points` per step were hit.
 
         Points are averaged over three steps, as rows of points do not keep step.
+
+        Parameters
+        ----------
+        min_arc : float
+            Radians.
+        min_points : int
+
+        Returns
+        -------
+        tuple of (float, float)
+            Metres.
         """
         near = uniform_filter1d(self.points_seen.astype(np.float64), 3, mode="nearest")
         is_seen = (self.arc_seen >= min_arc) & (near >= min_points) & (self.points_seen > 0)
@@ -78,7 +100,20 @@ class TrueElement:
         )
 
     def is_visible(self, chainage: Array, min_arc: float = MIN_ARC) -> NDArray[np.bool_]:
-        """Whether the axis was seen at each `chainage`; see `visible_ranges`."""
+        """Whether the axis was seen at each `chainage`; see `visible_ranges`.
+
+        Parameters
+        ----------
+        chainage : ndarray
+            Metres, shape (n,).
+        min_arc : float
+            Radians.
+
+        Returns
+        -------
+        ndarray of bool
+            Shape (n,).
+        """
         is_seen = np.zeros(len(chainage), dtype=np.bool_)
         for start, end in self.visible_ranges(min_arc):
             is_seen |= (chainage >= start) & (chainage <= end)
@@ -155,11 +190,25 @@ class Truth:
     deformations: tuple[TrueDeformation, ...]
 
     def element(self, element_id: int) -> TrueElement:
-        """Return the element with this id."""
+        """Return the element with this id.
+
+        Parameters
+        ----------
+        element_id : int
+
+        Returns
+        -------
+        TrueElement
+        """
         return self.elements[element_id - 1]
 
     def save(self, path: Path) -> None:
-        """Write the truth as JSON, in world coordinates, angles in degrees."""
+        """Write the truth as JSON, in world coordinates, angles in degrees.
+
+        Parameters
+        ----------
+        path : Path
+        """
         data = {
             "origin": self.origin.tolist(),
             "coverage_step_m": COVERAGE_STEP,

@@ -83,7 +83,17 @@ class Surface:
         return max(0.25 * self.voxel, 3.0 * self.noise, 0.002)
 
     def part(self, rows: NDArray[np.integer]) -> "Surface":
-        """Some of the points, without the cloud's points that they are means of."""
+        """Some of the points, without the cloud's points that they are means of.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            Indices of downsampled points.
+
+        Returns
+        -------
+        Surface
+        """
         return Surface(
             self.xyz[rows],
             self.normals[rows],

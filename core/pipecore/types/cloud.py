@@ -44,7 +44,13 @@ class Field:
     description: str = ""
 
     def scaled(self) -> Array:
-        """Return what the stored values stand for, float64; nan where there is none."""
+        """Return what the stored values stand for, float64; nan where there is none.
+
+        Returns
+        -------
+        ndarray
+            Shape as of `values`.
+        """
         scaled = self.values * self.scale + self.offset
         if self.no_data is not None:
             scaled = np.where(self.values == self.no_data, np.nan, scaled)
@@ -246,7 +252,18 @@ class PointCloud(Summarised):
         return {name: text for name, text in facts.items() if text}
 
     def world(self, local: Array) -> Array:
-        """World coordinates (float64) of local ones, any shape (..., 3)."""
+        """World coordinates (float64) of local ones, any shape (..., 3).
+
+        Parameters
+        ----------
+        local : ndarray
+            Metres.
+
+        Returns
+        -------
+        ndarray
+            Metres, shape as of `local`.
+        """
         return np.asarray(local, dtype=np.float64) + self.origin
 
     def take(self, rows: NDArray[np.bool_] | NDArray[np.integer[Any]] | slice) -> "PointCloud":

@@ -132,7 +132,18 @@ class Element(Summarised):
         return {name: text for name, text in facts.items() if text}
 
     def radius_at(self, chainage: Array | float) -> Array:
-        """Radius of the fitted surface about the axis at `chainage`, metres."""
+        """Radius of the fitted surface about the axis at `chainage`, metres.
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres.
+
+        Returns
+        -------
+        ndarray
+            Shape as of `chainage`.
+        """
         s = np.asarray(chainage, dtype=np.float64)
         if self.kind is ElementKind.SPHERE:
             along = (self.centre - self.axis.start) @ self.axis.tangent(0.0)

@@ -106,7 +106,17 @@ class Profiles(Summarised):
         return np.asarray(self.radius - self.radius_deviation - self.semi_minor)
 
     def of_element(self, element_id: int, stack_id: int | None = None) -> "Profiles":
-        """Return the rows of one element, of one stack if given."""
+        """Return the rows of one element, of one stack if given.
+
+        Parameters
+        ----------
+        element_id : int
+        stack_id : int, optional
+
+        Returns
+        -------
+        Profiles
+        """
         rows = self.element_id == element_id
         if stack_id is not None:
             rows &= self.stack_id == stack_id
@@ -114,7 +124,16 @@ class Profiles(Summarised):
 
     @classmethod
     def concatenate(cls, tables: "list[Profiles]") -> "Profiles":
-        """Return one table with the rows of all."""
+        """Return one table with the rows of all.
+
+        Parameters
+        ----------
+        tables : list of Profiles
+
+        Returns
+        -------
+        Profiles
+        """
         if not tables:
             return cls.empty()
         return cls(*(np.concatenate([getattr(t, f.name) for t in tables]) for f in fields(cls)))

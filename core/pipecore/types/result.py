@@ -90,38 +90,98 @@ class Result(Summarised):
         return self.unit if chosen is LengthUnit.AUTO else FileUnit.of(chosen)
 
     def settings_of(self, element_id: int) -> Settings:
-        """Return the settings with which an element was found."""
+        """Return the settings with which an element was found.
+
+        Parameters
+        ----------
+        element_id : int
+
+        Returns
+        -------
+        Settings
+        """
         return self.own_settings.get(element_id, self.settings)
 
     def run_label(self, run_id: int) -> str:
-        """What people call a run: its own name, else such as "Run 3"."""
+        """What people call a run: its own name, else such as "Run 3".
+
+        Parameters
+        ----------
+        run_id : int
+
+        Returns
+        -------
+        str
+        """
         return self.run_names.get(run_id) or f"Run {run_id}"
 
     def element(self, element_id: int) -> Element:
-        """Return the element with this id; `KeyError` if there is none."""
+        """Return the element with this id; `KeyError` if there is none.
+
+        Parameters
+        ----------
+        element_id : int
+
+        Returns
+        -------
+        Element
+        """
         return find_by_id(self.elements, "element_id", element_id)
 
     def deformation(self, deformation_id: int) -> Deformation:
-        """Return the deformation with this id; `KeyError` if there is none."""
+        """Return the deformation with this id; `KeyError` if there is none.
+
+        Parameters
+        ----------
+        deformation_id : int
+
+        Returns
+        -------
+        Deformation
+        """
         return find_by_id(self.deformations, "deformation_id", deformation_id)
 
     def deformations_of(self, element_id: int) -> tuple[Deformation, ...]:
-        """Return the deformations of one element."""
+        """Return the deformations of one element.
+
+        Parameters
+        ----------
+        element_id : int
+
+        Returns
+        -------
+        tuple of Deformation
+        """
         return tuple(d for d in self.deformations if d.element_id == element_id)
 
     # Tables and reports stand above the types in the library: they are reached through the
     # package itself, which imports them when they are first used.
 
     def elements_table(self) -> Table:
-        """Return the elements as ``elements.csv`` has them; see `pipecore.report`."""
+        """Return the elements as ``elements.csv`` has them; see `pipecore.report`.
+
+        Returns
+        -------
+        Table
+        """
         return pipecore.report.elements_table(self)
 
     def profiles_table(self) -> Table:
-        """Return the profiles as ``profiles.csv`` has them."""
+        """Return the profiles as ``profiles.csv`` has them.
+
+        Returns
+        -------
+        Table
+        """
         return pipecore.report.profiles_table(self)
 
     def deformations_table(self) -> Table:
-        """Return the deformations as ``deformations.csv`` has them."""
+        """Return the deformations as ``deformations.csv`` has them.
+
+        Returns
+        -------
+        Table
+        """
         return pipecore.report.deformations_table(self)
 
     def save(

@@ -42,6 +42,17 @@ class Stack:
     min_spacing: float = 0.0
 
     def profile_index(self, xyz: Floats) -> NDArray[np.int32]:
-        """Index of the profile that each point of `xyz` (n, 3) falls into."""
+        """Index of the profile that each point of `xyz` (n, 3) falls into.
+
+        Parameters
+        ----------
+        xyz : ndarray
+            Local coordinates, shape (n, 3).
+
+        Returns
+        -------
+        ndarray of int32
+            Shape (n,).
+        """
         along = np.asarray(xyz, dtype=np.float64) @ self.direction
         return np.floor((along - self.offset) / self.width).astype(np.int32)

@@ -144,7 +144,23 @@ class NearbyPoints:
     def around_axis(
         self, axis: Axis, radius: float, margin: float, inner: float = INNER_RADII
     ) -> Indices:
-        """Downsampled points from `inner` radii off `axis` on, up to `margin` beyond its ends."""
+        """Downsampled points from `inner` radii off `axis` on, up to `margin` beyond its ends.
+
+        Parameters
+        ----------
+        axis : LineAxis or ArcAxis
+        radius : float
+            Of the pipe, metres.
+        margin : float
+            Metres.
+        inner : float
+            Radii.
+
+        Returns
+        -------
+        ndarray of intp
+            Indices of downsampled points.
+        """
         tube = cell_search.Tube(
             axis.numbers, inner * radius, OUTER_RADII * radius, -margin, axis.length + margin
         )
@@ -180,6 +196,10 @@ class NearbyPoints:
             Least cosine between a point's normal and the surface's.
         is_rough : bool
             Whether a sample of the points will do where there are many.
+
+        Returns
+        -------
+        PointsOnSurface
         """
         inner, outer = INNER_RADII * model.radius, OUTER_RADII * model.radius
         points = point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
@@ -219,6 +239,22 @@ class NearbyPoints:
         """Free downsampled points within `band` of a sphere whose normals agree with it.
 
         With `is_rough`, a sample of them where there are many.
+
+        Parameters
+        ----------
+        model : SphereSurface
+        is_free : ndarray of bool
+            Downsampled points that may be on the sphere.
+        band : float
+            Metres.
+        min_cos : float
+            Least cosine between a point's normal and the sphere's.
+        is_rough : bool
+
+        Returns
+        -------
+        ndarray of intp
+            Indices of downsampled points.
         """
         outer = min(model.radius + band, MAX_SPHERE_RADII * model.radius)
         inner = model.radius - band
@@ -232,13 +268,37 @@ class NearbyPoints:
         )  # fmt: skip
 
     def usual_spacing(self, downsampled: Indices) -> float:
-        """Distance between neighbours among some downsampled points, not below the thinning's."""
+        """Distance between neighbours among some downsampled points, not below the thinning's.
+
+        Parameters
+        ----------
+        downsampled : ndarray of intp
+            Indices of downsampled points, shape (k,).
+
+        Returns
+        -------
+        float
+            Metres.
+        """
         return float(
             point_search.usual_spacing(self.surface.spacing, downsampled, self.surface.voxel)
         )
 
     def within_ball(self, centre: Array, radius: float) -> Indices:
-        """Downsampled points within `radius` of a place, in order."""
+        """Downsampled points within `radius` of a place, in order.
+
+        Parameters
+        ----------
+        centre : ndarray
+            Local coordinates, shape (3,).
+        radius : float
+            Metres.
+
+        Returns
+        -------
+        ndarray of intp
+            Indices of downsampled points.
+        """
         cells = cell_search.cells_in_shell(self._grid, centre, 0.0, radius)
         return np.asarray(
             point_search.points_in_ball(self.surface.xyz, self._grid, cells, centre, radius)
@@ -249,6 +309,18 @@ class NearbyPoints:
 
         Those of one voxel are in the order of their coordinates, so that the
         order of the cloud does not matter.
+
+        Parameters
+        ----------
+        downsampled : ndarray of intp
+            Indices of downsampled points, shape (k,).
+
+        Returns
+        -------
+        rows : ndarray of intp
+            Of the cloud, shape (n,).
+        xyz : ndarray
+            Local coordinates, shape (n, 3).
         """
         n = int(self._n_in_voxel(downsampled).sum())
         index, xyz = np.empty(n, np.intp), np.empty((n, 3))
@@ -258,7 +330,20 @@ class NearbyPoints:
         return index, xyz
 
     def full_resolution_with_normals(self, downsampled: Indices) -> tuple[Indices, Array, Array]:
-        """As `full_resolution`, with the normals of the downsampled points, one for each point."""
+        """As `full_resolution`, with the normals of the downsampled points, one for each point.
+
+        Parameters
+        ----------
+        downsampled : ndarray of intp
+            Indices of downsampled points, shape (k,).
+
+        Returns
+        -------
+        rows : ndarray of intp
+            Of the cloud, shape (n,).
+        xyz, normals : ndarray
+            Shape (n, 3).
+        """
         index, xyz = self.full_resolution(downsampled)
         normals = np.repeat(
             self.surface.normals[downsampled], self._n_in_voxel(downsampled), axis=0
