@@ -177,7 +177,7 @@ class ElementEdits(QObject):
         names = ", ".join(label_of(result.element(i)) for i in ids[:3]) + (
             "…" if len(ids) > 3 else ""
         )
-        settings = self._session.document.settings
+        settings = self._session.document.detection_settings
 
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:
             progress.expect(STAGES)
@@ -196,7 +196,8 @@ class ElementEdits(QObject):
         from pipecore import editing  # noqa: PLC0415 - loads numba
         from pipecore.pipeline import STAGES  # noqa: PLC0415
 
-        box, settings = self._session.document.view.clip_box, self._session.document.settings
+        document = self._session.document
+        box, settings = document.view.clip_box, document.detection_settings
         assert box is not None
 
         def change(cloud: PointCloud, result: Result, progress: JobProgress) -> Result:

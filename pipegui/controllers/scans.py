@@ -1,6 +1,6 @@
 """Scans and detections: opening files, detecting, and what comes of both."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
@@ -95,7 +95,7 @@ class Scans(QObject):
             answers[tr("Join to one cloud")] = lambda: self._rereading.join(opened)
         else:
             [scan] = scans
-            answers |= self._rereading.offers(scan, units_in_doubt(scan))
+            answers |= self._rereading.offers(scan, units_in_doubt(scan, notes))
             if scan.guessed_columns:
                 guess = columns_text(scan.guessed_columns)
                 lines.append(tr("Columns guessed: {columns}.").format(columns=guess))
@@ -124,7 +124,7 @@ class Scans(QObject):
             field.clearFocus()
         document = self._session.document
         if document.scan is not None:
-            self._session.jobs.detect(document.scan.cloud, document.settings)
+            self._session.jobs.detect(document.scan.cloud, document.detection_settings)
 
     def on_detected(self, cloud: PointCloud, result: Result) -> None:
         """Take the result of a detection, and sum it up in a message."""
@@ -138,10 +138,12 @@ class Scans(QObject):
         active = session.document.scan
         scan = next((s for s in session.document.scans if s.cloud is cloud), None)
         whose = f"{scan.name}: " if scan is not None and scan is not active else ""
-        answers = (
-            self._rereading.offers(scan, other_units(scan))
-            if scan is not None and not result.elements
-            else {}
-        )
         text = f"{whose}{descriptions.summary(result)}{hint}.{took}"
+        answers: Mapping[str, Callable[[], object]] = {}
+        # The notes on the cloud were said when it was read.
+        if notes := [note for note in result.notes if note not in cloud.notes]:
+            text, severity = "\n".join([text, *map(reason_text, notes)]), "warning"
+        if scan is not None:
+            units = units_in_doubt(scan, notes) if result.elements else other_units(scan)
+            answers = self._rereading.offers(scan, units)
         session.show_message(text, severity, answers=answers)

@@ -220,6 +220,11 @@ class Document:
         return self.scans[self.active] if self.scans else None
 
     @property
+    def detection_settings(self) -> Settings:
+        """The settings for a detection on the active scan: with those it was read with."""
+        return replace(self.settings, input=self.scan.reading) if self.scan else self.settings
+
+    @property
     def result(self) -> Result | None:
         """The result of the active scan."""
         return self.scan.result if self.scan else None

@@ -1,6 +1,6 @@
 """The units of files in words, and which of them to offer for a scan."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from pipecore.io.coordinates import UNIT_LABELS
 from pipecore.notes import Note
@@ -21,8 +21,10 @@ READ_IN = {
     LengthUnit.METRE: mark("Read in metres"),
     LengthUnit.MILLIMETRE: mark("Read in millimetres"),
     LengthUnit.FOOT: mark("Read in feet"),
+    LengthUnit.INCH: mark("Read in inches"),
 }
-"""The units that are offered with one click, and the text of the button."""
+"""The units that can be offered with one click, and the text of the button."""
+USUAL = (LengthUnit.METRE, LengthUnit.MILLIMETRE, LengthUnit.FOOT)
 
 
 def unit_text(unit: FileUnit) -> str:
@@ -37,20 +39,22 @@ def _spelled(name: str) -> str:
     return tr(UNIT_LABELS.get(name, name))
 
 
-def units_in_doubt(scan: Scan) -> tuple[LengthUnit, ...]:
-    """Return other units to offer, if something was said of the unit when the scan was read."""
-    if any(map(doubts_unit, scan.cloud.notes)):
-        return other_units(scan)
-    if any("system" in note.values and "unit" in note.values for note in scan.cloud.notes):
+def units_in_doubt(scan: Scan, notes: Sequence[Note]) -> tuple[LengthUnit, ...]:
+    """Return other units to offer, if notes on the scan say something of its unit."""
+    named = [LengthUnit(note.values["other"]) for note in notes if doubts_unit(note)]
+    if named:
+        usual = other_units(scan)
+        return (named[0], *(unit for unit in usual if unit is not named[0]))
+    if any("system" in note.values and "unit" in note.values for note in notes):
         return (LengthUnit.METRE,)
     return ()
 
 
 def doubts_unit(note: Note) -> bool:
-    """Return whether a note says that a cloud makes no sense in its unit."""
-    return "other" in note.values
+    """Return whether a note says that a cloud makes no sense in its unit, and names another."""
+    return note.values.get("other") in set(READ_IN)
 
 
 def other_units(scan: Scan) -> tuple[LengthUnit, ...]:
-    """Return the units that are offered with one click and in which a scan was not read."""
-    return tuple(unit for unit in READ_IN if str(unit) != scan.cloud.unit.name)
+    """Return the usual units in which a scan was not read."""
+    return tuple(unit for unit in USUAL if str(unit) != scan.cloud.unit.name)

@@ -1,5 +1,6 @@
 """Scans read anew: in another unit with one click, and several as one cloud."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from PySide6.QtGui import QGuiApplication
 
 from pipecore.io import write_laz
+from pipecore.notes import Note
 from pipecore.settings import LengthUnit
 from pipegui.controllers.rereading import Rereading
 from pipegui.project.project_file import ProjectError, read_project
@@ -153,3 +155,28 @@ def test_that_many_notes_are_told_in_few_lines_and_kept_with_the_scan(app, qtbot
         for i in range(app.window.panels.properties.list.topLevelItemCount())
     ]
     assert "Notes" in labels
+
+
+def test_that_sizes_that_speak_for_feet_offer_them_after_detecting(make_app, qtbot, in_mm):
+    cloud, result = make_scan(N)
+    note = Note("In {unit} none has a nominal size; in {other} all have.", unit="m", other="ft")
+    cloud = replace(cloud, source=in_mm)
+    asked = []
+
+    def detect(_, settings, __):
+        asked.append(settings.input)
+        return replace(result, notes=(note,))
+
+    app = make_app(read=lambda *_: replace(cloud), detect=detect)
+    open_files(app, qtbot, [in_mm])
+    app.controllers.scans.detect()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    assert "in ft all have" in app.window.panels.message.text.text()
+    assert app.window.panels.message.answer_buttons[0].text() == "Read in feet"
+    button(app, "Read in feet").click()
+    qtbot.waitUntil(lambda: app.session.document.result is None)
+    assert app.session.document.scan.reading.length_unit is LengthUnit.FOOT
+    # A detection is told how the scan was read: its report can be made again.
+    app.controllers.scans.detect()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    assert [given.length_unit for given in asked] == [LengthUnit.AUTO, LengthUnit.FOOT]
