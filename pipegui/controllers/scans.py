@@ -96,10 +96,12 @@ class Scans(QObject):
         else:
             [scan] = scans
             answers |= self._rereading.offers(scan, units_in_doubt(scan, notes))
-            if scan.guessed_columns:
-                guess = columns_text(scan.guessed_columns)
-                lines.append(tr("Columns guessed: {columns}.").format(columns=guess))
-                answers[tr("Change columns…")] = lambda: self._columns.change(scan)
+        guessed = [scan for scan in scans if scan.guessed_columns]
+        if guessed:
+            guess = columns_text(guessed[0].guessed_columns)
+            lines.append(tr("Columns guessed: {columns}.").format(columns=guess))
+            alike = [s for s in guessed if s.guessed_columns == guessed[0].guessed_columns]
+            answers[tr("Change columns…")] = lambda: self._columns.change(alike)
         is_warning = any(note.template not in HARMLESS for note in notes)
         if lines:
             severity = "warning" if is_warning else "info"

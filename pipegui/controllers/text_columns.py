@@ -42,15 +42,16 @@ class TextColumns(QObject):
     def change_active(self) -> None:
         """Ask for the columns of the active scan's file, and read it anew."""
         if (scan := self._session.document.scan) is not None and scan.files:
-            self.change(scan)
+            self.change([scan])
 
-    def change(self, scan: Scan) -> None:
-        """Ask for the columns of a scan's file, and read it anew."""
+    def change(self, scans: Sequence[Scan]) -> None:
+        """Ask for the columns of scans whose files have the same ones, and read them anew."""
 
         def read(text_format: TextFormat) -> None:
-            self._rereading.with_columns(scan, str(text_format))
+            for scan in scans:
+                self._rereading.with_columns(scan, str(text_format))
 
-        self._ask(scan.files[0], scan.reading.columns, read)
+        self._ask(scans[0].files[0], scans[0].reading.columns, read)
 
     def on_read_failed(self, paths: Sequence[Path], message: str, details: str) -> None:
         """Say why files could not be read; of text its columns can be named."""

@@ -195,3 +195,28 @@ def test_that_the_dialog_speaks_german(app, qtbot, table, german):
     choose(dialog, 1, "-")
     assert dialog.said.text().startswith("Wählen Sie die Spalte")
     dialog.reject()
+
+
+def test_that_files_opened_together_get_their_columns_together(app, qtbot, table):
+    other = table.with_name("other.txt")
+    other.write_bytes(table.read_bytes())
+    app.controllers.scans.open_files([table, other])
+    wait_until_read(app, qtbot, 2)
+    bar = app.window.panels.message
+    [change] = [b for b in bar.answer_buttons if b.text() == "Change columns…"]
+    qtbot.mouseClick(change, LEFT)
+    dialog = dialog_of(app, qtbot)
+    for column, role in enumerate(("-", "z", "x", "y")):
+        choose(dialog, column, role)
+    dialog._accept()
+    qtbot.waitUntil(
+        lambda: [s.reading.columns for s in app.session.document.scans] == ["-,z,x,y"] * 2
+    )
+
+
+def test_that_what_is_no_text_is_told_so(app, tmp_path):
+    path = tmp_path / "a.bin"
+    path.write_bytes(bytes(1000))
+    app.controllers.columns.open([path])
+    assert app.window.findChild(TextColumnsDialog) is None
+    assert "is no text" in app.window.panels.message.text.text()

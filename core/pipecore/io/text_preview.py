@@ -175,6 +175,8 @@ def _first_lines(path: Path) -> list[str]:
             head = file.read(HEAD_BYTES)
     except OSError as error:
         raise ReadError("There is no file “{path}”.", path=path) from error
+    if b"\0" in head:
+        raise ReadError("“{name}” is no text: it has no columns to choose.", name=path.name)
     lines = [line.decode("utf-8-sig", errors="replace") for line in head.splitlines()]
     if len(head) == HEAD_BYTES and len(lines) > 1:
         lines.pop()  # It may be cut.
