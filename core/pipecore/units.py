@@ -15,7 +15,16 @@ MIN_METRES, MAX_METRES = 1e-9, 1e9
 
 
 def is_unit(metres: float) -> bool:
-    """Return whether a number can be the metres in a unit of length; nan cannot."""
+    """Return whether a number can be the metres in a unit of length; nan cannot.
+
+    Parameters
+    ----------
+    metres : float
+
+    Returns
+    -------
+    bool
+    """
     return MIN_METRES < metres < MAX_METRES
 
 
@@ -41,7 +50,16 @@ class FileUnit:
 
     @classmethod
     def of(cls, unit: LengthUnit) -> "FileUnit":
-        """Return the unit of all three coordinates; `unit` is not AUTO."""
+        """Return the unit of all three coordinates; `unit` is not AUTO.
+
+        Parameters
+        ----------
+        unit : LengthUnit
+
+        Returns
+        -------
+        FileUnit
+        """
         return cls(str(unit), unit.metres, str(unit), unit.metres)
 
     @classmethod
@@ -49,11 +67,29 @@ class FileUnit:
         """Return the unit of x and y, and that of z, each by name and metres.
 
         Units that `LengthUnit` knows get its names and exact values: files round feet.
+
+        Parameters
+        ----------
+        plan, height : (str, float)
+            Name and metres in one unit.
+
+        Returns
+        -------
+        FileUnit
         """
         return cls(*_known(*plan), *_known(*height))
 
     def is_of(self, plan: tuple[str, float], height: tuple[str, float]) -> bool:
-        """Return whether units of plan and height, by name and metres, are these."""
+        """Return whether units of plan and height, by name and metres, are these.
+
+        Parameters
+        ----------
+        plan, height : (str, float)
+
+        Returns
+        -------
+        bool
+        """
         other = FileUnit.of_lengths(plan, height)
         return (self.metres, self.height_metres) == (other.metres, other.height_metres)
 

@@ -15,7 +15,7 @@ from pipecore.simulate import Scanner, Scene, scan
 from pipecore.simulate.scene import Box, Reducer, Run, Straight
 from pipecore.simulate.scoring import score
 from pipecore.types import ElementKind
-from tests.core.shapes import cloud_of, jittered, random_rotation, sampled, tube
+from tests.core.shapes import cloud_of, random_rotation, sampled, tube
 
 NOISE, SPACING = 0.0015, 0.008
 
@@ -25,21 +25,6 @@ def straight(axis, radius):
     model = LineSurface(axis.at(axis.length / 2), axis.direction, radius)
     fit = SurfaceFit(model, np.eye(5) * 1e-8, NOISE, 1000)
     return FittedElement(fit, axis, np.arange(0), Extent(0, axis.length, np.pi, 1.0, ()), 0.0)
-
-
-def cone(rng, axis, radii, arc):
-    """Points of a cone and their normals, seen over an arc around 12:00."""
-    along, around = jittered(rng, axis.length, arc * np.mean(radii), SPACING)
-    clock = around / np.mean(radii) - arc / 2
-    slope = (radii[1] - radii[0]) / axis.length
-    xyz = surface_points(axis, along, radii[0] + slope * along, clock)
-    normals = unit_rows(xyz - axis.at(along)) - slope * axis.direction
-    normals = unit_rows(normals)
-    return xyz + NOISE * rng.normal(size=(len(xyz), 1)) * normals, normals
-
-
-def unit_rows(vectors):
-    return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
 
 class Joint:
@@ -61,11 +46,13 @@ class Joint:
         )
 
     def points(self, rng, arc):
-        ends = [
-            tube(rng, a, r, spacing=SPACING, noise=NOISE, arc=arc)
-            for a, r in zip(self.whole, self.radii, strict=True)
-        ]
-        return ends[0], cone(rng, self.axis, self.radii, arc), ends[1]
+        first, last = self.radii
+        of_scan = {"spacing": SPACING, "noise": NOISE, "arc": arc}
+        return (
+            tube(rng, self.whole[0], first, **of_scan),
+            tube(rng, self.axis, first, radius_end=last, **of_scan),
+            tube(rng, self.whole[1], last, **of_scan),
+        )
 
     @property
     def step(self):
@@ -158,6 +145,46 @@ def test_that_a_cylinder_in_the_side_of_a_reducer_may_be_part_of_it_and_others_n
     assert not step.has_between(straight(inside, 0.06))
     assert not step.has_between(straight(LineAxis(origin + 1.02 * along, across, 0.2), 0.085))
     assert not step.has_between(straight(LineAxis(origin + 0.08 * across, along, 2.0), 0.085))
+
+
+def test_that_distances_from_straight_cone_and_straight_vanish_on_them_and_grow_off_them(rng):
+    joint = Joint(rng, (0.1, 0.06), 0.15)
+    step = joint.step
+    axis = LineAxis(joint.axis.at(-0.3), joint.axis.direction, 0.75)
+    chainage, clock = rng.uniform(0, axis.length, 300), rng.uniform(0, 2 * np.pi, 300)
+    radius = np.interp(chainage, [0.3, 0.45], joint.radii)
+    for outside in (0.0, 0.004):
+        xyz = surface_points(axis, chainage, radius + outside, clock)
+        assert_allclose(step.off(xyz, 0.0, np.array([step.gap])), outside, atol=1e-9)
+    xyz = surface_points(axis, chainage, radius, clock)
+    longer = step.off(xyz, 0.0, np.array([step.gap, 2 * step.gap]))[1]
+    assert longer.max() > 0.01
+
+
+@pytest.mark.parametrize("overshoot", [(-0.02, 0.01), (0.03, 0.02)])
+def test_that_the_axis_of_a_cone_goes_from_one_straight_to_the_other(rng, overshoot):
+    joint = Joint(rng, (0.1, 0.06), 0.15, overshoot)
+    step = joint.step
+    begin = -overshoot[0] if step.one.radius == 0.1 else -overshoot[1]
+    axis = step.axis(begin, begin + 0.15)
+    ends = np.stack([axis.start, axis.end])
+    chainage, rho, _ = joint.axis.pipe_coordinates(ends)
+    assert_allclose(sorted(chainage), [0.0, 0.15], atol=1e-9)
+    assert_allclose(rho, 0.0, atol=1e-9)
+    cone = step.cone(begin, begin + 0.15)
+    assert cone.radius == pytest.approx(0.08)
+    assert abs(cone.slope) == pytest.approx(0.04 / 0.15)
+
+
+def test_that_no_reducer_is_fitted_to_few_points_or_to_those_of_others(rng):
+    joint = Joint(rng, (0.1, 0.06), 0.15)
+    parts = joint.points(rng, np.pi)
+    nearby = NearbyPoints(cloud_of(*parts), sampled(*parts))
+    everything = np.ones(len(nearby.surface.xyz), np.bool_)
+    assert fit_reducer(joint.step, joint.straights, nearby, everything) is not None
+    assert fit_reducer(joint.step, joint.straights, nearby, ~everything) is None
+    few = everything & (np.arange(len(everything)) % (len(everything) // 11) == 0)
+    assert fit_reducer(joint.step, joint.straights, nearby, few) is None
 
 
 def line_of_pipes(seed):

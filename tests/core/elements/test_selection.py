@@ -136,9 +136,9 @@ def test_that_straights_that_are_too_short_are_returned_and_keep_their_points(rn
     assert selector.is_free.all()
 
 
-def fitted(axis, inliers):
+def fitted(axis, inliers, radius=RADIUS):
     """A straight as the refinement leaves it."""
-    model = LineSurface(axis.at(axis.length / 2), axis.direction, RADIUS)
+    model = LineSurface(axis.at(axis.length / 2), axis.direction, radius)
     extent = Extent(0.0, axis.length, 2 * np.pi, 1.0, ())
     fit = SurfaceFit(model, np.eye(5) * 1e-8, NOISE, 1000)
     return FittedElement(fit, axis, np.asarray(inliers, np.intp), extent, 0.0)
@@ -164,4 +164,27 @@ def test_that_an_end_is_joined_once_and_the_fitting_linked_to_its_straights(rng)
     # It was given the points that its straight had, and nothing is given once more.
     assert (along[accepted[2].inliers] < 0.64).any()
     selector.try_proposal(proposed(between, length=0.3), between=ends)
+    assert len(selector.result()[0]) == 3
+
+
+def test_that_a_straight_in_the_side_of_a_reducer_is_replaced_by_it_and_the_links_follow(rng):
+    q = random_rotation(rng)
+    wide, narrow = LineAxis(-0.6 * q[0], q[0], 0.6), LineAxis(0.3 * q[0], q[0], 0.6)
+    between = LineAxis(np.zeros(3), q[0], 0.3)
+    cone = tube(rng, between, 0.1, radius_end=0.06, spacing=SPACING, noise=NOISE)
+    parts = [scanned(rng, wide, 0.1), cone, scanned(rng, narrow, 0.06)]
+    surface = sampled(*parts)
+    along = surface.xyz @ q[0]
+    selector = Selector(NearbyPoints(cloud_of(*parts), surface), SETTINGS)
+    selector.accept(fitted(wide, np.flatnonzero(along < 0.0), 0.1))
+    inside = np.flatnonzero((along > 0.1) & (along < 0.2))
+    selector.accept(fitted(LineAxis(0.1 * q[0], q[0], 0.1), inside, 0.08))
+    selector.accept(fitted(narrow, np.flatnonzero(along > 0.3), 0.06))
+    selector.try_reducers()
+    accepted, links = selector.result()
+    assert [f.fit.model.is_tapered for f in accepted] == [False, False, True]
+    assert links in ([(2, 0), (2, 1)], [(2, 1), (2, 0)])
+    assert np.isin(inside, accepted[2].inliers).mean() > 0.9
+    # Both ends are joined now: nothing comes of another try.
+    selector.try_reducers()
     assert len(selector.result()[0]) == 3
