@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipecore.errors import ReadError
+from pipecore.io.ahead import read_ahead
 from pipecore.io.coordinates import unit_of
 from pipecore.io.crs import ReferenceSystem
 from pipecore.io.growing import GrowingCloud
@@ -104,22 +105,33 @@ def read(
     sizes = np.array([path.stat().st_size for path in files], dtype=np.float64)
     starts = np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum()
     cloud = GrowingCloud(unit, system, stations, folder, corners, is_exact=has_fields)
-    for i, path in enumerate(files):
-        with recognised[i].open(path, options) as source:
+    done = 0.0
+
+    def check() -> None:
+        progress.update("reading", min(done, 1.0))
+
+    with read_ahead(
+        list(zip(files, recognised, strict=True)),
+        options,
+        lambda source: chunks_of(source, corners),
+        check,
+        has_overview=look is not None,
+    ) as opened:
+        for i, file in enumerate(opened):
             before = cloud.n_points
-            cloud.begin_file(path, source, int(sizes[i]))
-            for chunk in chunks_of(source, corners):
+            cloud.begin_file(file.path, file.source, int(sizes[i]))
+            for chunk in file.chunks:
                 start = cloud.n_points
                 cloud.add(chunk)
                 if look is not None and cloud.n_points > start:
-                    if start == before and source.overview is not None:
-                        look(cloud.of_chunk(source.overview()))
+                    if start == before and file.overview is not None:
+                        look(cloud.of_chunk(file.overview))
                     look(cloud.part(start, LOOK_POINTS))
-                done = starts[i] + chunk.fraction * (starts[i + 1] - starts[i])
-                progress.update("reading", min(float(done), 1.0))
+                done = float(starts[i] + chunk.fraction * (starts[i + 1] - starts[i]))
+                check()
             cloud.end_file()
             if cloud.n_points == before and corners is None:
-                raise no_points(path, source.left_out)
+                raise no_points(file.path, file.source.left_out)
     if cloud.n_points == 0:
         raise ReadError(
             "No point of “{name}” lies in the box that was asked for.", name=files[0].name

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipecore.io import coordinates
+from pipecore.io.ahead import run_checked
 from pipecore.io.left_out import STRAY, left_out_notes
 from pipecore.io.reading import common_unit, no_points
 from pipecore.io.registry import identify
@@ -135,7 +136,12 @@ def info(
             raise no_points(path, source.left_out)
         progress.update("reading", 1.0)
         low, high = survey.bounds()
-        spacing = _spacing(source, np.concatenate(survey.sample), survey.n_points)
+        sample = np.concatenate(survey.sample)
+        # A million points may take a second, and be asked to stop.
+        spacing = run_checked(
+            lambda: _spacing(source, sample, survey.n_points),
+            lambda: progress.update("reading", 1.0),
+        )
         notes += survey.notes(low, high)
         spacing_m = spacing * unit.metres
         notes += coordinates.sense_notes(
