@@ -10,11 +10,15 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 from PySide6.QtCore import QCoreApplication, QSettings, Qt
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QApplication
 
+from pipecore.io import read
+from pipecore.resources import resource
 from pipegui.composition import Application, compose
+from pipegui.panels.text_columns_dialog import TextColumnsDialog
 from pipegui.style import theme
 from pipegui.window.views import make_views
 from pipegui.work.job_queue import JobQueue
@@ -48,8 +52,13 @@ def picture(app: Application, name: str) -> None:
     while (now := app.window.grab().toImage()) != last and time.monotonic() < end:
         last = now
         linger(LOOK_AGAIN)
+    save(now, name)
+
+
+def save(image: QImage, name: str) -> None:
+    """Save a picture."""
     path = IMAGES / f"{name}.png"
-    if not now.save(str(path)):
+    if not image.save(str(path)):
         raise SystemExit(f"{path} could not be written")
     print(path.name, flush=True)
 
@@ -96,6 +105,24 @@ def walk(app: Application) -> None:
     picture(app, "guide-dark")
 
 
+def text_columns(app: Application, folder: Path) -> None:
+    """Show the dialog for the columns of a text file: the demo's points, the station first."""
+    cloud = read(resource("demo", "demo.laz"))
+    rows = np.arange(0, len(cloud), len(cloud) // 3000)
+    station = 1 + np.arange(len(rows)) % 2
+    grey = np.full(len(rows), 255)
+    path = folder / "export.txt"
+    world = cloud.world(cloud.xyz[rows].astype(float))
+    np.savetxt(path, np.column_stack([station, world, grey]), fmt="%d %.3f %.3f %.3f %d")
+    app.controllers.columns.open([path])
+    dialog = app.window.findChild(TextColumnsDialog)
+    for column, role in enumerate(("station", "x", "y", "z", "-")):
+        dialog.table.role_chosen.emit(column, role)
+    linger(LOOK_AGAIN)
+    save(dialog.grab().toImage(), "guide-columns")
+    dialog.reject()
+
+
 def main() -> None:
     """Take all pictures."""
     qt = QApplication(sys.argv[:1])
@@ -106,6 +133,7 @@ def main() -> None:
         app.window.actions_["appearance_light"].trigger()
         app.window.resize(*SIZE)
         app.window.show()
+        text_columns(app, Path(scratch))
         walk(app)
         app.controllers.project.discard_changes()
         app.window.close()
