@@ -307,7 +307,7 @@ class ProjectSession(QObject):
                 scan, fingerprint = saved.scans[number], Fingerprint.if_there(path)
                 reading = scan.cloud.how_read(saved.settings)
                 try:
-                    others = saved.other_files(number)
+                    others = saved.other_files(number, path)
                     cloud = read((path, *others), reading, progress)
                 except CancelledError:
                     raise

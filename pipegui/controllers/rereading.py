@@ -48,7 +48,8 @@ class Rereading(QObject):
 
     def join(self, scans: Sequence[Scan]) -> None:
         """Read scans anew as one cloud, each of them a station."""
-        there = [s for s in self._session.document.scans if any(s is other for other in scans)]
+        wanted = {id(scan.cloud) for scan in scans}
+        there = [scan for scan in self._session.document.scans if id(scan.cloud) in wanted]
         files = tuple(path for scan in there for path in scan.files)
         if len(there) < 2:
             return

@@ -77,17 +77,22 @@ class Scans(QObject):
     def on_scan_read_again(self, clouds: Sequence[PointCloud], scan: Scan) -> None:
         """Put a scan in the place of those that it was read from anew."""
         self._together = []
+        gone = {id(cloud) for cloud in clouds}
+        had_results = any(s.result for s in self._session.document.scans if id(s.cloud) in gone)
         self._rereading.on_read_again(clouds, scan)
-        self._tell([scan])
+        self._tell([scan], tr("Undo brings back what was detected.") if had_results else "")
 
-    def _tell(self, scans: Sequence[Scan]) -> None:
-        """Say what was left out or guessed of scans, with what can be done about it."""
+    def _tell(self, scans: Sequence[Scan], more: str = "") -> None:
+        """Say what was left out or guessed of scans, with what can be done about it.
+
+        `more` is said besides.
+        """
         self._session.hide_message()
         notes = [note for scan in scans for note in scan.cloud.notes]
         if len(scans) > 1:
             notes = [note for note in notes if note.template not in HARMLESS]
         notes.sort(key=lambda note: not doubts_unit(note))
-        lines = [reason_text(note) for note in notes]
+        lines = [*map(reason_text, notes), *([more] if more else [])]
         answers: dict[str, Callable[[], object]] = {}
         if len(scans) > 1:
             lines.insert(0, tr("{n} scans were opened.").format(n=len(scans)))

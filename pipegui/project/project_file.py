@@ -108,17 +108,24 @@ class SavedProject:
         """Find the cloud of each scan."""
         return [scan.cloud.locate(self.path.parent) for scan in self.scans]
 
-    def other_files(self, number: int) -> tuple[Path, ...]:
-        """Find the other files of a scan's cloud; `ProjectError` if one is not as it was."""
-        found = [(ref, *ref.locate(self.path.parent)) for ref in self.scans[number].cloud.others]
-        for reference, _, state in found:
-            if state is not CloudState.FOUND:
+    def other_files(self, number: int, first: Path) -> tuple[Path, ...]:
+        """Find the other files of a scan's cloud; `ProjectError` if one is not as it was.
+
+        Where they are not in their places, they may be beside the `first` one, which was found.
+        """
+        found = []
+        for reference in self.scans[number].cloud.others:
+            beside = replace(reference, path=first.with_name(reference.path.name), relative="")
+            places = [ref.locate(self.path.parent) for ref in (reference, beside)]
+            there = [path for path, state in places if state is CloudState.FOUND]
+            if not there:
                 raise ProjectError(
                     tr("“{file}”, a part of “{name}”, is not there or has changed.").format(
                         file=reference.path, name=self.scans[number].name
                     )
                 )
-        return tuple(path for _, path, _ in found)
+            found.append(there[0])
+        return tuple(found)
 
     def document(self, scans: tuple[Scan, ...]) -> Document:
         """Return the document of the scans with their clouds; some may be left out."""

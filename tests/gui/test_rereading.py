@@ -5,7 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import QMimeData, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QGuiApplication
+from PySide6.QtWidgets import QApplication
 
 from pipecore.io import write_laz
 from pipecore.notes import Note
@@ -128,9 +130,16 @@ def test_that_a_project_without_a_part_of_its_scan_says_which(app, qtbot, two, t
     project = tmp_path / "work.pipegui"
     app.controllers.project._write(project, lambda: None)
     qtbot.waitUntil(lambda: app.controllers.project.path == project)
-    two[1].unlink()
+    # Moved together, they are found together.
+    moved = tmp_path / "moved"
+    moved.mkdir()
+    for path in two:
+        path.rename(moved / path.name)
+    saved = read_project(project)
+    assert saved.other_files(0, moved / "north.laz") == (moved / "south.laz",)
+    (moved / "south.laz").unlink()
     with pytest.raises(ProjectError, match=r"south\.laz.*a part of"):
-        read_project(project).other_files(0)
+        saved.other_files(0, moved / "north.laz")
 
 
 def test_that_scans_closed_meanwhile_are_not_replaced(app, qtbot, in_mm):
@@ -176,7 +185,35 @@ def test_that_sizes_that_speak_for_feet_offer_them_after_detecting(make_app, qtb
     button(app, "Read in feet").click()
     qtbot.waitUntil(lambda: app.session.document.result is None)
     assert app.session.document.scan.reading.length_unit is LengthUnit.FOOT
+    assert app.window.panels.message.text.text() == "Undo brings back what was detected."
     # A detection is told how the scan was read: its report can be made again.
     app.controllers.scans.detect()
     qtbot.waitUntil(lambda: app.session.document.result is not None)
     assert [given.length_unit for given in asked] == [LengthUnit.AUTO, LengthUnit.FOOT]
+
+
+def test_that_several_files_are_dropped_and_one_is_closed(app, qtbot, two):
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(path)) for path in two])
+    where, copy = app.window.rect().center(), Qt.DropAction.CopyAction
+    held = Qt.MouseButton.LeftButton, Qt.KeyboardModifier(0)
+    QApplication.sendEvent(app.window, QDragEnterEvent(where, copy, mime, *held))
+    drop = QDropEvent(where.toPointF(), copy, mime, *held)
+    QApplication.sendEvent(app.window, drop)
+    qtbot.waitUntil(lambda: len(app.session.document.scans) == 2)
+    wait_until_idle(app, qtbot)
+    qtbot.keyClick(app.window, Qt.Key.Key_W, Qt.KeyboardModifier.ControlModifier)
+    assert [scan.name for scan in app.session.document.scans] == ["north.laz"]
+
+
+def test_that_scans_are_joined_though_one_was_detected_meanwhile(make_app, qtbot, two):
+    def detect(cloud, settings, progress):
+        return replace(make_scan(N)[1], origin=cloud.origin, source=cloud.source)
+
+    app = make_app(read=read_files, detect=detect)
+    open_files(app, qtbot, two)
+    scans = app.session.document.scans
+    app.controllers.scans.detect()
+    qtbot.waitUntil(lambda: app.session.document.result is not None)
+    app.controllers.rereading.join(scans)
+    qtbot.waitUntil(lambda: len(app.session.document.scans) == 1)
