@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import laspy
 import numpy as np
 import pytest
 
@@ -226,3 +227,41 @@ def test_that_an_empty_scan_beside_a_full_one_is_said(tmp_path: Path) -> None:
     cloud = io.read(write_e57(tmp_path / "a.e57", scans))
     assert np.abs(cloud.world(cloud.xyz.astype(float)) - xyz).max() < 1e-4
     assert_said(cloud.notes, ["Scan 1 of “a.e57” holds no points"])
+
+
+@pytest.mark.parametrize(("version", "point_format"), [("1.2", 1), ("1.4", 1), ("1.4", 6)])
+def test_that_points_which_no_header_announces_are_read(
+    tmp_path: Path, version: str, point_format: int
+) -> None:
+    header = laspy.LasHeader(version=version, point_format=point_format)
+    header.scales = np.full(3, 1e-4)
+    las = laspy.LasData(header)
+    las.xyz = pipe()
+    las.write(tmp_path / "a.las")
+    raw = bytearray((tmp_path / "a.las").read_bytes())
+    raw[107:111] = bytes(4)
+    if version == "1.4":
+        raw[247:255] = bytes(8)
+    (tmp_path / "a.las").write_bytes(raw)
+    cloud = io.read(tmp_path / "a.las")
+    np.testing.assert_allclose(cloud.world(cloud.xyz), pipe(), atol=1e-4)
+    assert_said(cloud.notes, ["announces no points; the 2,000 that it holds were read"])
+    assert io.info(tmp_path / "a.las").n_points == 2000
+
+
+def test_that_lists_before_coordinates_in_text_are_passed_over(tmp_path: Path) -> None:
+    header = "ply\nformat ascii 1.0\nelement vertex 2000\nproperty list uchar int a\n"
+    header += "property double x\nproperty double y\nproperty list uchar int b\n"
+    header += "property double z\nproperty uchar red\nproperty uchar green\n"
+    header += "property uchar blue\nend_header\n"
+    rows = [
+        f"{i % 3}{' 7' * (i % 3)} {x:.4f} {y:.4f} 1 9 {z:.4f} 10 20 30\n"
+        for i, (x, y, z) in enumerate(pipe())
+    ]
+    (tmp_path / "a.ply").write_text(header + "".join(rows))
+    cloud = io.read(tmp_path / "a.ply")
+    np.testing.assert_allclose(cloud.world(cloud.xyz), pipe(), atol=1e-5)
+    assert (cloud.rgb == [10, 20, 30]).all()
+    (tmp_path / "a.ply").write_text(header + "".join(rows)[:-12])
+    with pytest.raises(ReadError, match="truncated"):
+        io.read(tmp_path / "a.ply")

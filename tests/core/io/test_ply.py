@@ -152,10 +152,7 @@ XYZ = "property float x\nproperty float y\nproperty float z\n"
         ("ply\nformat ascii 1.0\nend_header\n", "no vertices"),
         ("ply\nelement vertex 1\n" + XYZ + "end_header\n1 2 3\n", "no format"),
         (HEADER + "property float x\nend_header\n1\n", "no x, y and z"),
-        (
-            HEADER + "property list uchar int k\n" + XYZ + "end_header\n0 1 2 3\n",
-            "lists before x, y, z",
-        ),
+        (HEADER + "property list uchar int k\n" + XYZ + "end_header\n2 1 2 3\n", "truncated"),
         (HEADER + XYZ + "property vast w\nend_header\n1 2 3 4\n", "line 7"),
         (HEADER + XYZ + "end_header\n1 2\n", "line 8"),
         (HEADER + XYZ + "end_header\n1 2 x\n", "line 8"),

@@ -101,6 +101,17 @@ def read_head(file: BinaryIO, path: Path) -> LasHead:
     announced = _mend_count(
         head, n_legacy, (size - start) // record_size if not kind & 0x80 else None
     )
+    if announced == 0 and not kind & _COMPRESSED:
+        announced = _held_count(head, start, size, record_size)
+        if announced:
+            notes.append(
+                Note(
+                    "The header of “{name}” announces no points; the {held:,} that it holds were "
+                    "read.",
+                    name=path.name,
+                    held=announced,
+                )
+            )
     for place in (26, 58):
         _mend_text(head, place, 32)
     no_data: dict[str, float] = {}
@@ -170,6 +181,23 @@ def _mend_count(head: bytearray, n_legacy: int, n_held: int | None) -> int:
         n_points = n_legacy
         struct.pack_into("<Q", head, 247, n_points)
     return int(n_points)
+
+
+def _held_count(head: bytearray, start: int, size: int, record_size: int) -> int:
+    """Points between the header and the records behind them, of a header that says none.
+
+    Programs that are stopped while they write leave such files.
+    """
+    end = size
+    if head[25] >= 4:
+        (behind,) = struct.unpack_from("<Q", head, 235)
+        end = behind if start <= behind <= size else size
+    n_points = (end - start) // record_size
+    if head[25] >= 4:
+        struct.pack_into("<Q", head, 247, n_points)
+    else:
+        struct.pack_into("<I", head, 107, min(n_points, 2**32 - 1))
+    return n_points
 
 
 def _mend_text(head: bytearray, place: int, length: int) -> None:

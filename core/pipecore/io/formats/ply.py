@@ -214,11 +214,7 @@ def _values(file: BinaryIO, path: Path, header: _Header, notes: list[Note]) -> I
 def _text_values(file: BinaryIO, path: Path, header: _Header) -> Iterator[Any]:
     vertex = header.vertex
     if vertex.has_list:
-        plain = [i for i, p in enumerate(vertex.properties) if p.count_kind]
-        first = min(plain)
-        if any(i >= first for i in find_columns(vertex.names).values()):
-            raise damaged(path, "PLY", "lists before x, y, z in text are not read")
-        yield from _text_before_lists(file, path, header, first)
+        yield from _text_with_lists(file, path, header)
         return
     n_columns = len(vertex.names)
     n_lines = header.n_lines + sum(e.count for e in header.before)
@@ -233,21 +229,30 @@ def _text_values(file: BinaryIO, path: Path, header: _Header) -> Iterator[Any]:
         raise truncated(path, vertex.count, n_read)
 
 
-def _text_before_lists(
-    file: BinaryIO, path: Path, header: _Header, n_columns: int
-) -> Iterator[Any]:
-    """Rows of text that end with lists: only what stands before these."""
+def _text_with_lists(file: BinaryIO, path: Path, header: _Header) -> Iterator[Any]:
+    """Rows of text with lists among their values, which are passed over."""
     n_read, n = 0, header.vertex.count
+    lists = [bool(p.count_kind) for p in header.vertex.properties]
     while n_read < n:
         lines = [file.readline() for _ in range(min(CHUNK_POINTS, n - n_read))]
-        values = [line.split(maxsplit=n_columns)[:n_columns] for line in lines]
-        n_whole = next((i for i, v in enumerate(values) if len(v) < n_columns), len(values))
+        values = [_without_lists(line.split(), lists) for line in lines]
+        n_whole = next((i for i, v in enumerate(values) if v is None), len(values))
         if n_whole < len(values):
             raise truncated(path, n, n_read + n_whole)
         rows = np.array(values, dtype=np.float64)
         n_read += len(rows)
-        # Lists cannot be asked for; what stands behind them is not read.
-        yield lambda i, rows=rows: rows[:, min(i, n_columns - 1)], n_read / n
+        yield lambda i, rows=rows: rows[:, i], n_read / n
+
+
+def _without_lists(words: list[bytes], lists: list[bool]) -> list[bytes] | None:
+    """The plain values of a line, 0 for each list; None if it is too short."""
+    place, plain = 0, []
+    for is_list in lists:
+        if place >= len(words):
+            return None
+        plain.append(b"0" if is_list else words[place])
+        place += 1 + (int(words[place]) if is_list and words[place].isdigit() else 0)
+    return plain if place <= len(words) else None
 
 
 def _list_values(file: BinaryIO, path: Path, header: _Header) -> Iterator[Any]:
