@@ -90,7 +90,7 @@ class CloudExports(QObject):
         suffix = source.suffix.lower() if source is not None else ""
         name = f"{Path(scan.name).stem} {what}"
         return file_dialogs.ask_cloud_target(
-            self._window, self._session.stored, title, name, suffix
+            self._window, self._session.stored, title, name, suffix, beside=source
         )
 
     def _tell(self, path: Path, n_points: int, notes: tuple[Note | str, ...]) -> None:

@@ -1,5 +1,6 @@
 """Asking for files: what to open, where to export to, which ones were open lately."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,11 +9,14 @@ from PySide6.QtWidgets import QFileDialog, QWidget
 
 from pipecore.errors import PipecoreError
 from pipecore.io import file_filter, formats
+from pipecore.resources import resource
 from pipegui.controllers.session import Session
 from pipegui.i18n.texts import error_text, tr
 from pipegui.project.project_file import SUFFIX
 
 N_RECENT = 10
+DEMO = resource("demo", "demo.laz")
+"""Nobody looks for their own files beside it."""
 WRITTEN_CLOUDS = (".laz", ".las", ".ply", ".e57")
 
 
@@ -108,7 +112,12 @@ def ask_target(
 
 
 def ask_cloud_target(
-    parent: QWidget, settings: QSettings, title: str, name: str, suffix: str
+    parent: QWidget,
+    settings: QSettings,
+    title: str,
+    name: str,
+    suffix: str,
+    beside: Path | None = None,
 ) -> Path | None:
     """Ask where to write points, and in which format.
 
@@ -124,6 +133,8 @@ def ask_cloud_target(
         The file's proposed name, without ending.
     suffix : str
         Ending of the format that is proposed; of LAZ if nothing can be written so.
+    beside : Path, optional
+        The file that the points came from: it is proposed to write beside it.
 
     Returns
     -------
@@ -133,7 +144,10 @@ def ask_cloud_target(
     proposed = suffix if suffix in WRITTEN_CLOUDS else ".laz"
     kinds = {f"{ending[1:].upper()} (*{ending})": ending for ending in WRITTEN_CLOUDS}
     first = next(kind for kind, ending in kinds.items() if ending == proposed)
-    start = str(Path(_last_folder(settings)) / (name + proposed))
+    folder = Path(_last_folder(settings))
+    if beside is not None and os.access(beside.parent, os.W_OK) and beside != DEMO:
+        folder = beside.parent
+    start = str(folder / (name + proposed))
     chosen, kind = QFileDialog.getSaveFileName(parent, title, start, ";;".join(kinds), first)
     if not chosen:
         return None

@@ -86,8 +86,10 @@ def replace_scan(document: Document, cloud: PointCloud, scan: Scan) -> Document:
 
 @step(mark("Join scans"))
 def join_scans(document: Document, clouds: Sequence[PointCloud], scan: Scan) -> Document:
-    """Put one scan in the place of those with these clouds."""
-    return _put_in_place(document, clouds, scan)
+    """Put one scan in the place of those with these clouds, and colour it by its stations."""
+    joined = _put_in_place(document, clouds, scan)
+    is_told = joined is not document and has_stations(scan.cloud)
+    return set_colour(joined, ColourBy.STATION) if is_told else joined
 
 
 def _put_in_place(document: Document, clouds: Sequence[PointCloud], scan: Scan) -> Document:

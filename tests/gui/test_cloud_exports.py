@@ -23,7 +23,7 @@ def target(monkeypatch):
 
     def answer(path: Path | None, kind: str = "") -> list:
         def ask(parent, title, proposed, kinds, first):
-            asked.append((title, Path(proposed).name, kinds, first))
+            asked.append((title, Path(proposed), kinds, first))
             return ("" if path is None else str(path), kind or first)
 
         monkeypatch.setattr(QFileDialog, "getSaveFileName", ask)
@@ -68,7 +68,7 @@ def test_that_a_cloud_is_written_in_each_format_and_is_the_same(
     asked = target(path)
     export(opened, qtbot, "export_cloud")
     [(title, name, kinds, first)] = asked
-    assert (title, name) == ("Export cloud", "plant copy.laz")
+    assert (title, name) == ("Export cloud", tmp_path / "plant copy.laz")
     assert first == "LAZ (*.laz)"
     assert kinds.count(";;") == 3
     again = read(path)
@@ -81,7 +81,7 @@ def test_that_what_is_hidden_is_not_written(opened, qtbot, target, tmp_path):
     opened.session.do(commands.set_hidden, [2], True)
     asked = target(tmp_path / "shown.las")
     export(opened, qtbot, "export_shown")
-    assert asked[0][1] == "plant part.laz"
+    assert asked[0][1].name == "plant part.laz"
     element_id = opened.session.document.result.element_id
     assert len(read(tmp_path / "shown.las")) == (element_id != 2).sum()
 
@@ -90,7 +90,7 @@ def test_that_the_selected_element_is_written(opened, qtbot, target, tmp_path):
     opened.session.do(selection_commands.select_element, 4)
     asked = target(tmp_path / "element.ply")
     export(opened, qtbot, "export_selection")
-    assert asked[0][1].startswith("plant ")
+    assert asked[0][1].name.startswith("plant ")
     element_id = opened.session.document.result.element_id
     assert len(read(tmp_path / "element.ply")) == (element_id == 4).sum()
 

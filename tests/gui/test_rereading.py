@@ -13,6 +13,7 @@ from pipecore.io import write_laz
 from pipecore.notes import Note
 from pipecore.settings import LengthUnit
 from pipegui.controllers.rereading import Rereading
+from pipegui.model.document import ColourBy
 from pipegui.project.project_file import ProjectError, read_project
 from pipegui.work.job_queue import read_files
 from tests.core.io.cases import pipe
@@ -104,6 +105,7 @@ def test_that_scans_opened_together_are_joined_with_one_click(app, qtbot, two):
     assert scan.cloud.station_names == ("north.laz", "south.laz")
     assert np.bincount(scan.cloud.station).tolist() == [0, N, N]
     assert scan.files == tuple(two)
+    assert app.session.document.view.colour_by is ColourBy.STATION
     app.session.undo()
     assert len(app.session.document.scans) == 2
 
