@@ -149,7 +149,8 @@ def set_result(document: Document, cloud: PointCloud, result: Result) -> Documen
             selection = selection_of_deformation(result, worst_deformation(result))
     view = document.view
     if index == document.active:
-        colour = view.colour_by if view.colour_by in NEEDS_RESULT else ColourBy.DEVIATION
+        is_kept = view.colour_by in NEEDS_RESULT or not result.elements
+        colour = view.colour_by if is_kept else ColourBy.DEVIATION
         view = replace(view, colour_by=colour, hidden_elements=frozenset(), shown_stack=NO_ID)
         view = replace(view, pinned_elements=())  # their numbers mean others now
         if colour is ColourBy.PROFILE:

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from pipecore.types import ReviewState
+from pipecore.types import Result, ReviewState
 from pipegui.i18n.texts import mark, tr
 from pipegui.panels.deformation_columns import COLUMNS, INDEX
 from pipegui.panels.deformation_filters import FilterBar
@@ -145,8 +145,7 @@ class DeformationTable(QWidget):
             if is_new or state.selected != before.selected:
                 self._show_selected()
         self._stack.setCurrentWidget(self._table if self.model.rowCount() else self._empty)
-        found = tr("No deformations found: every pipe keeps its shape.")
-        self._empty.setText(found if state.result is not None else tr(WAITING))
+        self._empty.setText(_why_empty(state.result))
         self._count()
 
     def _show_selected(self) -> None:
@@ -260,3 +259,11 @@ class _ReviewChoice(QStyledItemDelegate):
         """Hand over what was chosen."""
         assert isinstance(editor, QuietComboBox)
         model.setData(index, editor.currentData())
+
+
+def _why_empty(result: Result | None) -> str:
+    if result is None:
+        return tr(WAITING)
+    if not result.elements:
+        return tr("No pipes found, so there is nothing that could be deformed.")
+    return tr("No deformations found: every pipe keeps its shape.")

@@ -269,3 +269,10 @@ def test_that_reviews_follow_their_deformations_through_another_detection():
 def test_that_another_scan_is_not_clipped_by_the_box_of_the_first():
     document = commands.set_view(DETECTED, clip_box=ClipBox((0, 0, 0), (1, 1, 1)))
     assert commands.open_scan(document, Scan("b", CLOUD)).view.clip_box is None
+
+
+def test_that_a_cloud_without_pipes_keeps_its_colours():
+    document = commands.open_scan(Document(), Scan("a", CLOUD))
+    document = commands.set_colour(document, ColourBy.HEIGHT)
+    nothing = replace(RESULT, elements=(), deformations=())
+    assert commands.set_result(document, CLOUD, nothing).view.colour_by is ColourBy.HEIGHT

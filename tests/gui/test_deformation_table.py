@@ -1,5 +1,7 @@
 """The deformation table: columns, reviewing in place, copying; with real clicks and keys."""
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication
@@ -235,3 +237,11 @@ def test_that_neighbours_and_fittings_are_named(table):
     row = table.model.row_of(1)
     if dent.next_id:
         assert texts["next"][row].startswith(f"{dent.next_id}: ")
+
+
+def test_that_an_empty_table_says_why(table):
+    sound = replace(RESULT, deformations=())
+    table.apply(TableState(sound))
+    assert "every pipe keeps its shape" in table._empty.text()
+    table.apply(TableState(replace(sound, elements=())))
+    assert "No pipes found" in table._empty.text()
