@@ -6,7 +6,7 @@ from pipegui.controllers.session import Session
 from pipegui.model import result_queries
 from pipegui.model.document import ProfileKey
 from pipegui.model.stations import stations_of
-from pipegui.states import descriptions
+from pipegui.states import descriptions, hover_texts
 
 
 class Hovering(QObject):
@@ -36,7 +36,7 @@ class Hovering(QObject):
             descriptions.coordinates(scan.cloud, point_index) if scan and is_there else ""
         )
         self.description_changed.emit(
-            descriptions.hover_text(scan, point_index) if scan and is_there else ""
+            hover_texts.hover_text(scan, point_index) if scan and is_there else ""
         )
         if scan is not None and scan.result is not None:
             element_id = document.selection.element_id
@@ -51,7 +51,7 @@ class Hovering(QObject):
         self.coordinates_changed.emit("")
         for station in stations_of(scan.cloud):
             if station.station_id == station_id:
-                self.description_changed.emit(descriptions.station_text(station, scan.cloud))
+                self.description_changed.emit(hover_texts.station_text(station, scan.cloud))
 
     def hover_spot(self, place: tuple[float, float] | None) -> None:
         """Mark a spot of the selected element's surface: chainage in metres, clock angle."""

@@ -22,7 +22,7 @@ from pipegui.i18n.texts import count, first_capital, format_measure, label_of, m
 from pipegui.model.document import Scan, Selection
 from pipegui.model.stations import stations_of
 from pipegui.states import descriptions
-from pipegui.states.descriptions import station_label
+from pipegui.states.hover_texts import station_label, station_text
 from pipegui.states.view_state import TreeState
 from pipegui.style import theme
 from pipegui.style.colour_maps import station_colour
@@ -154,7 +154,7 @@ class ProjectModel(QAbstractItemModel):
             node = _Node(NodeKind.STATION, branch, index, station.station_id)
             label, points = station_label(station), descriptions.point_count(station.n_points)
             node.text, node.stations = f"{label} · {points}", (station.station_id,)
-            node.hint = descriptions.station_text(station, cloud)
+            node.hint = station_text(station, cloud)
             self._add(node)
 
     def _add_run(

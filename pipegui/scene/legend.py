@@ -18,7 +18,8 @@ from pipegui.scene.colouring import (
     effective,
     stack_of,
 )
-from pipegui.states.descriptions import point_count, station_label
+from pipegui.states.descriptions import point_count
+from pipegui.states.hover_texts import station_label
 from pipegui.style.colour_maps import (
     DEVIATION,
     HEIGHT,

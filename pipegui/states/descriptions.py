@@ -18,7 +18,6 @@ from pipecore.inspection.section import radius_is_measurable
 from pipecore.rules import outside_diameter
 from pipecore.settings import FieldSpec, Settings, iterate_fields
 from pipecore.types import (
-    NO_ID,
     Deformation,
     DeformationKind,
     Element,
@@ -32,7 +31,6 @@ from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
 from pipegui.model.document import Scan, Selection
 from pipegui.model.result_queries import stack_name
-from pipegui.model.stations import Station, has_stations, stations_of
 from pipegui.model.view_commands import extent
 from pipegui.states.unit_texts import unit_text
 from pipegui.states.view_state import PropertiesState
@@ -86,22 +84,6 @@ def point_count(n_points: int) -> str:
     return count("{n:,} point", "{n:,} points", n_points)
 
 
-def station_label(station: Station) -> str:
-    """Return what a station is called in the window: its name, or its number."""
-    name = station.name or str(station.station_id)
-    return tr("Station {name}").format(name=name) if name.isdigit() else name
-
-
-def station_text(station: Station, cloud: PointCloud) -> str:
-    """Return what is known of a station: its name, points and the scanner's position."""
-    lines = [station_label(station)]
-    if station.n_points:
-        lines.append(count("{n:,} point", "{n:,} points", station.n_points))
-    if station.position is not None:
-        lines += coordinate_lines(cloud, np.array(station.position))
-    return "\n".join(lines)
-
-
 def deformation_name(deformation: Deformation) -> str:
     """Return the name of a deformation: "Dent 3"."""
     return f"{first_capital(tr(deformation.kind))} {deformation.deformation_id}"
@@ -146,32 +128,6 @@ def coordinate_lines(cloud: PointCloud, local: Array) -> tuple[str, ...]:
     """Return the world coordinates of a local point, each with its name."""
     named = zip(axis_names(cloud), cloud.world(local), strict=True)
     return tuple(f"{name} {format_coordinate(float(value))}" for name, value in named)
-
-
-def hover_text(scan: Scan, point_index: int) -> str:
-    """Return name, radius, deviation and station under the cursor; "" where none is known."""
-    return "\n".join((*_element_lines(scan, point_index), *_station_lines(scan, point_index)))
-
-
-def _station_lines(scan: Scan, point_index: int) -> Iterator[str]:
-    cloud = scan.cloud
-    if cloud.station is not None and has_stations(cloud):
-        station_id = int(cloud.station[point_index])
-        yield from (station_label(s) for s in stations_of(cloud) if s.station_id == station_id)
-
-
-def _element_lines(scan: Scan, point_index: int) -> list[str]:
-    result = scan.result
-    element_id = NO_ID if result is None else int(result.element_id[point_index])
-    if result is None or element_id == NO_ID:
-        return []
-    element = result.element(element_id)
-    deviation = 1000 * float(result.deviation[point_index])
-    lines = [label_of(element), tr("radius {radius}").format(radius=radius_text(element))]
-    if math.isfinite(deviation):
-        side = tr("outward") if deviation > 0 else tr("inward")
-        lines.append(f"{abs(deviation):.1f} mm {side}")
-    return lines
 
 
 def radius_text(element: Element) -> str:

@@ -15,6 +15,7 @@ from pipegui.panels.project_tree import NodeKind
 from pipegui.scene.colouring import colour_points, visible_points
 from pipegui.scene.legend import make_legend
 from pipegui.scene.view import SceneView
+from pipegui.states.hover_texts import hover_text
 from pipegui.states.view_state import SceneState
 from pipegui.style.colour_maps import station_colour
 from pipegui.window.views import make_views
@@ -162,3 +163,9 @@ def test_that_a_hidden_station_has_no_points_and_no_mark_in_the_picture(qtbot):
     scene.apply(SceneState("a", CLOUD, None, view=view))
     assert len(scene.points) == (CLOUD.station == 2).sum()
     assert [mark.station_id for mark in scene.overlay.stations] == [2]
+
+
+def test_that_a_point_under_the_cursor_is_told_its_station():
+    index = int(np.flatnonzero(CLOUD.station == 2)[0])
+    assert hover_text(Scan("a", CLOUD), index) == "Station 2"
+    assert hover_text(Scan("a", make_cloud()), index) == ""
