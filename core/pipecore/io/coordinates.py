@@ -201,6 +201,8 @@ def _step_along(values: Array) -> float:
     if len(gaps) < FEWEST_GAPS or len(unique) > 0.9 * len(values):
         return 0.0
     step = float(gaps.min())
+    if step * 2.0**53 < gaps.max():
+        return 0.0
     # Values that are multiples of a step, but for the rounding of float64 itself.
     rest = np.abs(gaps / step - np.round(gaps / step))
     slack = 4 * np.spacing(np.abs(unique).max()) / step + 1e-6

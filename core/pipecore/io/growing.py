@@ -47,15 +47,23 @@ class GrowingArray:
         if self.file is not None:
             self.array = self.file.resized(n_rows)
             return
+        if not len(self.array):
+            # Zeros that are never touched take neither memory nor time.
+            self.array = np.zeros((n_rows, *self.array.shape[1:]), self.array.dtype)
+            return
         # In place (no second copy in memory); nothing else refers to the array yet.
         self.array.resize((n_rows, *self.array.shape[1:]), refcheck=False)
 
     def put(self, start: int, values: NDArray[Any] | int, n: int) -> None:
         """Set `n` rows, which may be new."""
+        self.rows(start, n)[...] = values
+
+    def rows(self, start: int, n: int) -> NDArray[Any]:
+        """Return `n` rows, which may be new, to be set."""
         end = start + n
         if end > len(self.array):
             self.resize(max(end, len(self.array) + len(self.array) // 2))
-        self.array[start:end] = values
+        return self.array[start:end]
 
 
 class GrowingCloud:
@@ -141,11 +149,11 @@ class GrowingCloud:
 
     def _append(self, xyz: Array, low: Array, high: Array, chunk: Chunk) -> None:
         assert self.origin is not None
-        local, n, start = xyz - self.origin, len(xyz), self.n_points
+        n, start = len(xyz), self.n_points
         reach = np.maximum(self.origin - low, high - self.origin).max()
         if self.xyz.array.dtype == np.float32 and reach > FLOAT32_REACH:
             self._widen_coordinates()
-        self.xyz.put(start, local, n)
+        np.subtract(xyz, self.origin, out=self.xyz.rows(start, n), casting="same_kind")
         if chunk.intensity is not None:
             self._put("intensity", np.float32, None, chunk.intensity, n)
         if chunk.rgb is not None:
@@ -160,6 +168,7 @@ class GrowingCloud:
     def _put(self, name: str, dtype: type, width: int | None, values: Any, n: int) -> None:
         if name not in self._columns:
             self._columns[name] = self._column(name, dtype, width)
+            self._columns[name].resize(len(self.xyz.array))
         self._columns[name].put(self.n_points, values, n)
 
     def _put_field(self, name: str, values: NDArray[Any], n: int) -> None:

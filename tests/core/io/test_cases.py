@@ -265,3 +265,10 @@ def test_that_lists_before_coordinates_in_text_are_passed_over(tmp_path: Path) -
     (tmp_path / "a.ply").write_text(header + "".join(rows)[:-12])
     with pytest.raises(ReadError, match="truncated"):
         io.read(tmp_path / "a.ply")
+
+
+def test_that_gaps_next_to_nothing_are_no_steps(tmp_path: Path) -> None:
+    xyz = np.repeat(pipe(), 2, axis=0)
+    xyz[:50] *= 5e-320
+    path = write_ply(tmp_path / "a.ply", {"vertex": columns_of(xyz)})
+    assert len(io.read(path)) == io.info(path).n_points

@@ -227,15 +227,20 @@ class _Reader:
         """The chunk of some points, without those that the file marks."""
         header, layout = self.head.header, self.head.header.point_format
         classes = np.asarray(points["classification"], dtype=np.uint8)
-        is_bad = self._marked(points, classes)
+        # Gathered once: each pass over records takes longer than all that is done with them.
+        raw = [np.ascontiguousarray(points[name]) for name in "XYZ"]
+        is_bad = self._marked(points, raw, classes)
         xyz = np.empty((len(points), 3))
         with np.errstate(all="ignore"):  # A damaged header's scales may be anything.
-            for axis, name in enumerate("XYZ"):
-                np.multiply(points[name], header.scales[axis], out=xyz[:, axis])
-                xyz[:, axis] += header.offsets[axis]
+            for axis, steps in enumerate(raw):
+                along = steps * header.scales[axis]
+                along += header.offsets[axis]
+                xyz[:, axis] = along
         rgb = None
         if "red" in layout.dimension_names:
-            rgb = np.stack([points["red"], points["green"], points["blue"]], axis=1)
+            rgb = np.empty((len(points), 3), np.uint16)
+            for i, name in enumerate(("red", "green", "blue")):
+                rgb[:, i] = points[name]
         chunk = Chunk(
             xyz,
             fraction,
@@ -253,7 +258,9 @@ class _Reader:
         layout = self.head.header.point_format
         return ORIGINAL_INTENSITY if _has_original_intensity(layout) else "intensity"
 
-    def _marked(self, points: Any, classes: NDArray[np.uint8]) -> NDArray[np.bool_] | None:
+    def _marked(
+        self, points: Any, xyz: list[NDArray[np.int32]], classes: NDArray[np.uint8]
+    ) -> NDArray[np.bool_] | None:
         """Which points the file marks as none, and counts of why; None if no point is."""
         is_new = self.head.header.point_format.id >= 6
         is_bad: NDArray[np.bool_] | None = None
@@ -265,10 +272,11 @@ class _Reader:
                 is_noise |= classes == _HIGH_NOISE
             marks.append((WITHHELD, (flags & (_WITHHELD_NEW if is_new else _WITHHELD_OLD)) != 0))
             marks.append((NOISE, is_noise))
-        for name in "XYZ":
-            raw = points[name]
-            if raw.max() == _INT32_MOST or raw.min() <= -_INT32_MOST:
-                marks.append((SATURATED, (raw == _INT32_MOST) | (raw <= -_INT32_MOST)))
+        marks += [
+            (SATURATED, (raw == _INT32_MOST) | (raw <= -_INT32_MOST))
+            for raw in xyz
+            if raw.max() == _INT32_MOST or raw.min() <= -_INT32_MOST
+        ]
         for reason, is_marked in marks:
             if is_marked.any():
                 is_new_bad = is_marked if is_bad is None else is_marked & ~is_bad
