@@ -25,7 +25,7 @@ KEEPS_CAPITALS = ("de",)
 """Languages that write nouns with a capital within a sentence too."""
 
 
-class _Chosen:
+class _ChosenLanguage:
     """The language in use; the tests and the library speak English."""
 
     code = "en"
@@ -35,15 +35,17 @@ class _Chosen:
 def use_language(chosen: str, system: str = "") -> None:
     """Speak a language from now on: the chosen one, else the system's (such as "de-AT")."""
     code = chosen or system[:2].lower()
-    _Chosen.code = code if code in LANGUAGES and code else "en"
-    _Chosen.catalogue = gettext.NullTranslations()
-    if _Chosen.code != "en":
-        _Chosen.catalogue = gettext.translation(DOMAIN, resource("locale"), [_Chosen.code])
+    _ChosenLanguage.code = code if code in LANGUAGES and code else "en"
+    _ChosenLanguage.catalogue = gettext.NullTranslations()
+    if _ChosenLanguage.code != "en":
+        _ChosenLanguage.catalogue = gettext.translation(
+            DOMAIN, resource("locale"), [_ChosenLanguage.code]
+        )
 
 
 def language() -> str:
     """Return the code of the language in use."""
-    return _Chosen.code
+    return _ChosenLanguage.code
 
 
 def mark(text: str) -> str:
@@ -53,12 +55,12 @@ def mark(text: str) -> str:
 
 def tr(text: str) -> str:
     """Return a text in the language in use."""
-    return _Chosen.catalogue.gettext(text) if text else ""
+    return _ChosenLanguage.catalogue.gettext(text) if text else ""
 
 
 def trn(singular: str, plural: str, number: int) -> str:
     """Return the form of a text that goes with a number."""
-    return _Chosen.catalogue.ngettext(singular, plural, number)
+    return _ChosenLanguage.catalogue.ngettext(singular, plural, number)
 
 
 def count(singular: str, plural: str, number: int) -> str:
@@ -73,7 +75,7 @@ def plain_title(title: str) -> str:
 
 def inside(text: str) -> str:
     """Return a name as it is written within a sentence."""
-    return text if _Chosen.code in KEEPS_CAPITALS else text[:1].lower() + text[1:]
+    return text if _ChosenLanguage.code in KEEPS_CAPITALS else text[:1].lower() + text[1:]
 
 
 def first_capital(text: str) -> str:

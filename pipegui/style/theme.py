@@ -80,7 +80,7 @@ class Appearance(StrEnum):
     DARK = "Dark"
 
 
-class _Chosen:
+class _ChosenAppearance:
     """What the user chose last; the same for all windows."""
 
     appearance = Appearance.SYSTEM
@@ -88,14 +88,14 @@ class _Chosen:
 
 def choose(appearance: Appearance) -> None:
     """Have dark or light colours whatever the system asks for, from the next drawing on."""
-    _Chosen.appearance = appearance
+    _ChosenAppearance.appearance = appearance
 
 
 def is_dark() -> bool:
     """Return whether the user, or else the system, asks for dark colours."""
-    if _Chosen.appearance is Appearance.SYSTEM:
+    if _ChosenAppearance.appearance is Appearance.SYSTEM:
         return QGuiApplication.styleHints().colorScheme() == Qt.ColorScheme.Dark
-    return _Chosen.appearance is Appearance.DARK
+    return _ChosenAppearance.appearance is Appearance.DARK
 
 
 def colour(role: str, *, dark: bool | None = None) -> QColor:

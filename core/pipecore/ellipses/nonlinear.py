@@ -170,7 +170,7 @@ def fit_nonlinear_ellipse(
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _ScaledFit:
     """A fit to the scaled points."""
 
     parameters: Array
@@ -181,7 +181,9 @@ class _Fit:
     condition: float
 
 
-def _in_units(fit: _Fit, middle: Array, scale: float, max_sd_share: float) -> FittedEllipse | NoFit:
+def _in_units(
+    fit: _ScaledFit, middle: Array, scale: float, max_sd_share: float
+) -> FittedEllipse | NoFit:
     """The fit in the units of the points, or why they do not determine it."""
     x, y, mean, cos_part, sin_part = scale * fit.parameters
     half_difference = float(np.hypot(cos_part, sin_part))
@@ -256,7 +258,7 @@ def _best_of_samples(points: Array) -> Array | None:
     return to_parameters(centre[best], semi_major[best], semi_minor[best], angle[best])
 
 
-def _least_squares(model: Model, points: Array, first: Array) -> _Fit | None:
+def _least_squares(model: Model, points: Array, first: Array) -> _ScaledFit | None:
     """Fit with equal weights; None if it does not converge."""
     weights = np.ones(len(points))
     parameters, rss = _descend(model, points, first, weights, max_evaluations=100)
@@ -264,7 +266,7 @@ def _least_squares(model: Model, points: Array, first: Array) -> _Fit | None:
         return None
     variance = rss / (len(points) - N_PARAMETERS)
     inverse, condition = _inverse_normal(model(points, parameters)[1])
-    return _Fit(parameters, variance * inverse, np.sqrt(variance), rss, weights, condition)
+    return _ScaledFit(parameters, variance * inverse, np.sqrt(variance), rss, weights, condition)
 
 
 def _descend(
@@ -296,7 +298,7 @@ def _inverse_normal(jacobian: Array) -> tuple[Array, float]:
     return (rotation.T / singular**2) @ rotation, float(singular[0] / singular[-1])
 
 
-def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
+def _reweighted(model: Model, points: Array, first: Array) -> _ScaledFit | None:
     """Iteratively reweighted fit with Tukey's biweight and a covariance after Huber."""
     parameters = first
     distances = model(points, parameters)[0]
@@ -325,7 +327,7 @@ def _reweighted(model: Model, points: Array, first: Array) -> _Fit | None:
     variance = ((weights * distances) ** 2).sum() / (n_near - N_PARAMETERS) / slope**2
     inverse, condition = _inverse_normal(model(points[near], parameters)[1])
     rss = float((weights * distances**2).sum())
-    return _Fit(parameters, variance * inverse, sigma, rss, weights, condition)
+    return _ScaledFit(parameters, variance * inverse, sigma, rss, weights, condition)
 
 
 def _spread(distances: Array) -> float:
