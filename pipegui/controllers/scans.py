@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QWidget
 
 from pipecore.io.left_out import NO_RETURN, left_out_notes
 from pipecore.resources import resource
+from pipecore.settings import InputSettings
 from pipecore.types import PointCloud, Result
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.rereading import Rereading
@@ -45,6 +46,8 @@ class Scans(QObject):
         self._columns = columns
         self._together: list[Scan] = []
         """Scans that were opened together."""
+        self._failed: list[str] = []
+        """Why some of them could not be read."""
 
     # Opening
 
@@ -62,8 +65,17 @@ class Scans(QObject):
         if projects:
             self.project_chosen.emit(projects[0])
         scans = [path for path in paths if path not in projects]
-        self._together = []
-        self._session.jobs.open_files(scans, self._session.document.settings.input)
+        self.read(scans, self._session.document.settings.input)
+
+    def read(self, paths: Sequence[Path], reading: InputSettings) -> None:
+        """Read scans in the background, with other settings than those of the document."""
+        self._together, self._failed = [], []
+        self._session.jobs.open_files(paths, reading)
+
+    def on_read_failed(self, paths: Sequence[Path], message: str, details: str) -> None:
+        """Say why files could not be read; what is read after them does not hide it."""
+        self._failed.append(message)
+        self._columns.on_read_failed(paths, "\n".join(self._failed), details)
 
     def on_scan_read(self, scan: Scan) -> None:
         """Add a scan that was read; what was left out or guessed of it is said."""
@@ -76,7 +88,7 @@ class Scans(QObject):
 
     def on_scan_read_again(self, clouds: Sequence[PointCloud], scan: Scan) -> None:
         """Put a scan in the place of those that it was read from anew."""
-        self._together = []
+        self._together, self._failed = [], []
         gone = {id(cloud) for cloud in clouds}
         had_results = any(s.result for s in self._session.document.scans if id(s.cloud) in gone)
         self._rereading.on_read_again(clouds, scan)
@@ -107,9 +119,10 @@ class Scans(QObject):
             lines.append(tr("Columns guessed: {columns}.").format(columns=guess))
             alike = [s for s in guessed if s.guessed_columns == guessed[0].guessed_columns]
             answers[tr("Change columns…")] = lambda: self._columns.change(alike)
+        lines[:0] = self._failed
         is_warning = any(note.template not in HARMLESS for note in notes)
         if lines:
-            severity = "warning" if is_warning else "info"
+            severity = "error" if self._failed else "warning" if is_warning else "info"
             text = "\n".join(lines)
             if (n_more := len(lines) - MOST_LINES) > 0:
                 more = count("One more note: Details", "{n} more notes: Details", n_more)

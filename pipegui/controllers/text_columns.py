@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from PySide6.QtCore import QObject
+from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from pipecore.errors import ReadError
@@ -19,6 +19,9 @@ from pipegui.panels.text_columns_dialog import TextColumnsDialog
 
 class TextColumns(QObject):
     """Asks what the columns of text files hold, and reads the files so."""
+
+    chosen = Signal(object, object)
+    """Paths of files to open, and the settings to read them with."""
 
     def __init__(self, session: Session, window: QWidget, rereading: Rereading) -> None:
         super().__init__(session)
@@ -35,7 +38,7 @@ class TextColumns(QObject):
         reading = self._session.document.settings.input
 
         def read(text_format: TextFormat) -> None:
-            self._session.jobs.open_files(paths, replace(reading, columns=str(text_format)))
+            self.chosen.emit(paths, replace(reading, columns=str(text_format)))
 
         self._ask(paths[0], reading.columns, read)
 

@@ -219,3 +219,18 @@ def test_that_scans_are_joined_though_one_was_detected_meanwhile(make_app, qtbot
     qtbot.waitUntil(lambda: app.session.document.result is not None)
     app.controllers.rereading.join(scans)
     qtbot.waitUntil(lambda: len(app.session.document.scans) == 1)
+
+
+def test_that_a_file_that_cannot_be_read_is_told_though_others_are_read_after_it(
+    app, qtbot, two, tmp_path
+):
+    broken = tmp_path / "broken.laz"
+    broken.write_bytes(b"LASF" + bytes(50))
+    open_files(app, qtbot, [broken, *two])
+    qtbot.waitUntil(lambda: len(app.session.document.scans) == 2)
+    bar = app.window.panels.message
+    assert "broken.laz" in bar.text.text()
+    assert "2 scans were opened." in bar.text.text()
+    assert bar.property("severity") == "error"
+    open_files(app, qtbot, [two[0]])
+    assert not bar.isVisible()

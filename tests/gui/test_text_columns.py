@@ -220,3 +220,12 @@ def test_that_what_is_no_text_is_told_so(app, tmp_path):
     app.controllers.columns.open([path])
     assert app.window.findChild(TextColumnsDialog) is None
     assert "is no text" in app.window.panels.message.text.text()
+
+
+def test_that_what_was_opened_before_is_not_told_again(app, qtbot, table):
+    app.controllers.scans.open_files([table])
+    wait_until_read(app, qtbot)
+    app.controllers.columns.open([table])
+    dialog_of(app, qtbot)._accept()
+    wait_until_read(app, qtbot, 2)
+    assert "2 scans were opened" not in app.window.panels.message.text.text()

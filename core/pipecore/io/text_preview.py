@@ -141,8 +141,8 @@ def preview_text(path: str | os.PathLike[str], text_format: TextFormat) -> TextP
 def _unread(lines: Sequence[str], text_format: TextFormat, error: ReadError) -> TextPreview:
     data = [line for line in lines[text_format.skip :] if not is_comment(line)]
     dialect = text_format.dialect(data[-1] if data else lines[-1])
-    values = [_values(line, dialect.delimiter) for line in lines]
-    n_columns = Counter(map(len, values)).most_common(1)[0][0]
+    lengths = [len(_values(line, dialect.delimiter)) for line in data or lines]
+    n_columns = Counter(lengths).most_common(1)[0][0]
     columns = (*text_format.columns, *("-",) * n_columns)[:n_columns]
     if n_columns < len(COORDINATES):
         error = ReadError(
