@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import pipecore
 from pipecore.errors import CancelledError, WriteError
 from pipecore.io import read, write_laz
 from pipecore.json_codec import from_plain, to_plain
@@ -100,6 +101,15 @@ def test_that_what_is_saved_comes_back_to_the_last_bit(document, tmp_path):
     assert saved.camera == {"position": [1.0, 2.0, 3.0]}
     again = reopened(saved)
     assert same(again, document)
+
+
+def test_that_the_library_loads_a_scan_of_a_project_as_the_window_has_it(document, tmp_path):
+    path = tmp_path / "work.pipegui"
+    write_project(path, document)
+    loaded = pipecore.load(path, "plant.laz")
+    kept = document.scans[1].result
+    assert loaded.source == Path(kept.source.name)
+    assert same(replace(loaded, source=kept.source), kept)
 
 
 def test_that_a_project_of_nothing_comes_back(tmp_path):
