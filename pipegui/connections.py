@@ -23,7 +23,7 @@ from pipegui.controllers.text_columns import TextColumns
 from pipegui.controllers.view_updates import ViewUpdates
 from pipegui.i18n.texts import LANGUAGES, tr
 from pipegui.model import commands, element_commands, selection_commands, view_commands
-from pipegui.model.document import Background, Tool
+from pipegui.model.document import Background, ColourBy, Tool
 from pipegui.style.theme import Appearance
 from pipegui.window.action_table import VIEW_OPTIONS
 from pipegui.window.context_menu import show_context_menu
@@ -107,6 +107,7 @@ def handlers(
         "reset_settings": lambda: do(commands.reset_settings),
         "next_deformation": lambda: do(selection_commands.step_deformation, 1),
         "previous_deformation": lambda: do(selection_commands.step_deformation, -1),
+        "colour_by_station": lambda: do(commands.set_colour, ColourBy.STATION),
         "isolate": lambda: do(commands.isolate),
         "show_all": lambda: do(commands.show_all),
         "export_cloud": controllers.cloud_exports.export_cloud,

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from pipegui.model.document import ColourBy, Document, Selection, Tool
 from pipegui.model.selection import elements_of
+from pipegui.model.stations import has_stations
 
 
 def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool]:
@@ -22,6 +23,7 @@ def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool
     return {
         "scan": document.scan is not None,
         "scans": len(document.scans) > 1,
+        "stations": document.scan is not None and has_stations(document.scan.cloud),
         "text": document.scan is not None and document.scan.is_text,
         "result": result is not None,
         "deformations": result is not None and bool(result.deformations),

@@ -193,6 +193,14 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
                 "",
                 "scan",
             ),
+            _A(
+                "colour_by_station",
+                "Colour by station",
+                "Give the points of each station a colour of their own",
+                "",
+                "",
+                "stations",
+            ),
             _option(
                 "eye_dome",
                 "Eye-dome lighting (EDL)",

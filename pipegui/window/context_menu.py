@@ -7,7 +7,7 @@ from pipegui.panels.project_tree import NodeKind
 from pipegui.window.actions import Actions
 
 _OF_ELEMENTS = ("zoom", "isolate", "hide", "show_all", "export_selection", "")
-_OF_STATIONS = ("show_all", "show_stations", "", "export_shown")
+_OF_STATIONS = ("colour_by_station", "show_all", "show_stations", "", "export_shown")
 CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
     NodeKind.SCAN: (
         "fit",

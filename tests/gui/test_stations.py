@@ -92,6 +92,12 @@ def test_that_one_station_is_no_colouring():
     assert ColourBy.STATION in commands.colours_of(Scan("a", CLOUD))
 
 
+def test_that_the_menu_colours_by_station_where_there_are_several(app, opened, qtbot):
+    assert not app.window.actions_["colour_by_station"].isEnabled()
+    opened.window.actions_["colour_by_station"].trigger()
+    assert opened.session.document.view.colour_by is ColourBy.STATION
+
+
 def test_that_points_of_a_hidden_station_are_not_visible():
     visible = visible_points(CLOUD, None, frozenset(), hidden_stations=frozenset({2, 99}))
     assert (visible == (CLOUD.station != 2)).all()
