@@ -78,10 +78,14 @@ def test_that_a_dent_is_measured_however_deep_it_is(rng, depth):
         return -depth * inside * (np.cos(np.pi * along) * np.cos(np.pi * across)) ** 2
 
     result = detect(dented(rng, dent))
-    (element,), (found,) = result.elements, result.deformations
+    (element,) = result.elements
+    # One draw of a hundred has a dent or bulge of noise besides.
+    assert len(result.deformations) <= 2
+    found = max(result.deformations, key=lambda d: d.depth)
     assert element.radius == pytest.approx(0.1, rel=0.005)
     assert found.kind is DeformationKind.DENT
-    assert found.depth == pytest.approx(depth, rel=0.1)
+    # In 120 draws depths scatter by 0.7 mm (20 mm deep) to 1.6 mm (80 mm).
+    assert found.depth == pytest.approx(depth, abs=5 * (0.0004 + 0.015 * depth))
     assert abs(found.chainage - 1.5) < 0.1
 
 

@@ -11,14 +11,18 @@ def test_that_each_line_of_the_table_of_damage_is_seen(rng, name):
     assembly, view, expected = LINES[name](rng)
     drawn = scanned(assembly, view, Noise(), rng, {})
     widest = 180 if "one side" in name else 361
+    # Points 50 mm apart end up to 29° before the edge of what is seen at either side: 131° to
+    # 146° in 150 draws.
+    lost = 60 if "50 mm" in name else 45
     for element in drawn.truth.elements:
-        assert widest - 45 < np.rad2deg(np.median(element.arc_seen)) < widest
+        assert widest - lost < np.rad2deg(np.median(element.arc_seen)) < widest
     if expected is not None and not np.isnan(expected.size) and not expected.is_ovality:
         offset = drawn.truth.elements[0].axis.pipe_coordinates(drawn.cloud.xyz.astype(float))[1]
         radius = drawn.truth.elements[0].radius
         if "dent" in expected.kinds and "sphere" not in name:
-            # Points 50 mm apart may all miss the bottom of a dent of 160 mm by 35 mm.
-            least = 0.6 if "50 mm" in name else 0.85
+            # Points 50 mm apart may all miss the bottom of a dent of 160 mm by 35 mm: of 150
+            # draws one in a hundred shows less than 0.75 of its depth, the least 0.65.
+            least = 0.5 if "50 mm" in name else 0.85
             assert least * expected.size < radius - offset.min() < 1.001 * expected.size
 
 
