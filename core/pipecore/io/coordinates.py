@@ -85,7 +85,7 @@ def _unit_notes(path: Path, system: ReferenceSystem, unit: FileUnit) -> tuple[No
                 "names it; results are in metres and millimetres.",
                 name=path.name,
                 unit=_spelled(unit.name),
-                system=system.name,
+                system=system.name or "unnamed",
             ),
         )
     return (
@@ -95,7 +95,7 @@ def _unit_notes(path: Path, system: ReferenceSystem, unit: FileUnit) -> tuple[No
             name=path.name,
             unit=_spelled(unit.name),
             height_unit=_spelled(unit.height_name),
-            system=system.name,
+            system=system.name or "unnamed",
         ),
     )
 
