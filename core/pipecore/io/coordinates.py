@@ -265,7 +265,9 @@ def float32_steps(xyz: Array) -> Array:
     return np.asarray(np.spacing(largest), dtype=np.float64)
 
 
-def header_bounds_notes(path: Path, source: Source, low: Array, high: Array) -> tuple[Note, ...]:
+def header_bounds_notes(
+    path: Path, source: Source, low: Array, high: Array, slack: float = 0.0
+) -> tuple[Note, ...]:
     """Return a note if a header's box is not that of the points.
 
     Parameters
@@ -275,10 +277,12 @@ def header_bounds_notes(path: Path, source: Source, low: Array, high: Array) -> 
         Read to its end.
     low, high : ndarray
         Lowest and highest coordinates of the points, in the file's unit.
+    slack : float
+        How far off they may be.
     """
-    if source.bounds is None or source.left_out.total():
+    if source.bounds is None or source.left_out.total() or not (low <= high).all():
         return ()
-    slack = 1.5 * max(source.step, 1e-9) + 1e-9 * np.abs([low, high]).max()
+    slack += 1.5 * max(source.step, 1e-9) + 1e-9 * np.abs([low, high]).max()
     if (np.abs(source.bounds - [low, high]) <= slack).all():
         return ()
     return (

@@ -104,6 +104,7 @@ class GrowingCloud:
         self._field_infos: dict[str, FieldInfo] = {}
         self._stations = StationTable(stations)
         self._files: list[tuple[Path, Source]] = []
+        self._extents: list[tuple[Array, Array]] = []
         self._file_start = 0
         self._has_wide_colours = False
         self._step = 0.0
@@ -123,6 +124,7 @@ class GrowingCloud:
         self._file_start = self.n_points
         self._has_wide_colours = False
         self._files.append((path, source))
+        self._extents.append((np.full(3, np.inf), np.full(3, -np.inf)))
         self._screen.begin_file(self._unit.factors)
         self._stations.begin_file(path, source)
         self._field_infos.update(source.field_infos)
@@ -145,6 +147,7 @@ class GrowingCloud:
             self._step = max(self._step, step)
         assert self._whereabouts is not None
         self._whereabouts.add(xyz, low, high)
+        self._extend(low, high)
         self._append(xyz, low, high, chunk if isinstance(keep, slice) else chunk.take(keep))
 
     def _append(self, xyz: Array, low: Array, high: Array, chunk: Chunk) -> None:
@@ -189,6 +192,12 @@ class GrowingCloud:
         bounds = self._whereabouts.bounds() if self._whereabouts is not None else None
         for chunk in self._screen.keep_zeros(bounds, source.left_out):
             self._append(self._screen.world(chunk.xyz), np.zeros(3), np.zeros(3), chunk)
+            self._extend(np.zeros(3), np.zeros(3))
+
+    def _extend(self, low: Array, high: Array) -> None:
+        """Have the box of the current file reach to these coordinates, metres."""
+        least, most = self._extents[-1]
+        self._extents[-1] = np.minimum(least, low), np.maximum(most, high)
 
     def _widen_coordinates(self) -> None:
         """Go over to float64."""
@@ -299,8 +308,13 @@ class GrowingCloud:
 
     def _all_notes(self) -> Iterator[Note]:
         yield from self._notes
-        for path, source in self._files:
+        for (path, source), (low, high) in zip(self._files, self._extents, strict=True):
             yield from source.notes
+            if self._screen.corners is None:
+                factors = self._unit.factors
+                yield from coordinates.header_bounds_notes(
+                    path, source, low / factors, high / factors
+                )
             yield from left_out_notes(path.name, source.left_out)
 
     def _drop_strays(self) -> None:

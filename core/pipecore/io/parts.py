@@ -21,7 +21,7 @@ from pipecore.io.growing import (
 from pipecore.io.mapped import MappedFile
 from pipecore.io.reading import common_unit, reading_of
 from pipecore.io.registry import identify
-from pipecore.io.screening import has_zeros
+from pipecore.io.screening import extremes, has_zeros
 from pipecore.io.source import CHUNK_POINTS, OpenOptions, Source
 from pipecore.io.stations import StationTable
 from pipecore.io.storage import common_storage
@@ -32,6 +32,8 @@ from pipecore.types import Array, PointCloud
 from pipecore.units import FileUnit
 
 PART_POINTS = 1_000_000
+FLOAT32_ERROR = 1e-4
+"""How far off coordinates may be that are kept as float32, metres."""
 _COLUMNS: dict[str, tuple[type, int | None]] = {
     "xyz": (np.float32, 3),
     "intensity": (np.float32, None),
@@ -123,7 +125,6 @@ def plan_parts(
     files: list[tuple[Path, int, Source]] = []
     n_points, has_colours, step = 0, False, 0.0
     of_steps: list[Note] = []
-    of_files: list[Note] = []
     for path in paths:
         starts = las.chunk_starts(path)
         if len(starts) < 2:
@@ -144,7 +145,6 @@ def plan_parts(
         own_notes, own_step = coordinates.notes_on_steps(path, source, first.xyz, unit)
         step = max(step, own_step)
         of_steps += own_notes
-        of_files += source.notes
         parts += [
             FilePart(path, rows, n_points + rows[0], origin, unit, is_wide, options)
             for rows in _grouped(starts)
@@ -164,7 +164,7 @@ def plan_parts(
         crs_wkt=system.wkt,
         unit=unit,
         step=step,
-        notes=(*notes, *of_steps, *of_files),
+        notes=(*notes, *of_steps),
         source=paths[0],
         storage=common_storage([source.storage for _, _, source in files], unit),
         reading=reading_of(paths, length_unit, flagged_points, stations, columns, None),
@@ -215,18 +215,31 @@ def finish_parts(folder: Path, planned: PlannedCloud) -> PointCloud:
     planned : PlannedCloud
     """
     cloud, table = planned.cloud, StationTable(planned.stations)
-    station = _open(folder, "station")
+    station, xyz = _open(folder, "station"), _open(folder, "xyz")
     begin = 0
+    notes = list(cloud.notes)
     for path, end, source in planned.files:
         table.begin_file(path, source)
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for start in range(begin, end, CHUNK_POINTS):
             rows = slice(start, min(start + CHUNK_POINTS, end))
             station[rows] = table.provisional(np.array(station[rows]), rows.stop - rows.start)
+            least, most = extremes(np.asarray(xyz[rows], np.float64))
+            low, high = np.minimum(low, least), np.maximum(high, most)
         begin = end
+        factors = cloud.unit.factors
+        notes += source.notes
+        notes += coordinates.header_bounds_notes(
+            path,
+            source,
+            (low + cloud.origin) / factors,
+            (high + cloud.origin) / factors,
+            FLOAT32_ERROR / cloud.unit.metres,
+        )
     path, _, source = planned.files[0]
     assert source.bounds is not None
     odd = odd_size_notes(path, cloud, source.bounds)
-    cloud = replace(cloud, notes=(*cloud.notes, *odd))
+    cloud = replace(cloud, notes=(*notes, *odd))
     ids, names, positions = table.finish()
     if ids is None:
         cloud = replace(cloud, station=None)
