@@ -7,6 +7,7 @@ from typing import Any
 
 import laspy
 import numpy as np
+import pye57
 import pyproj
 import pytest
 
@@ -20,6 +21,7 @@ from tests.ply import write_ply
 
 N = 3_000
 FEET = 1200 / 3937
+ENDS = "Minimum", "Maximum"
 
 
 def random() -> np.random.Generator:
@@ -107,14 +109,14 @@ def e57(path: Path) -> Path:
     rng = random()
     parts = np.split(xyz(), [1_000])
     colours = dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), integers(0, 255))
-    more = {"rowIndex": integers(0, 5_000), "columnIndex": integers(-3, 900)}
+    more = {"rowIndex": integers(0, 5_000), "columnIndex": integers(0, 900)}
     scans = []
     for i, part in enumerate(parts):
         place = np.array([412_300.0 + 9 * i, 5_654_300.25, 88.123456])
         columns = cartesian(part - place) | {"intensity": rng.uniform(-1, 1, len(part))}
         columns |= {name: rng.integers(0, 256, len(part)) for name in colours}
         columns |= {"rowIndex": rng.integers(0, 5_001, len(part))}
-        columns |= {"columnIndex": rng.integers(-3, 901, len(part))}
+        columns |= {"columnIndex": rng.integers(0, 901, len(part))}
         columns |= {"timeStamp": rng.uniform(0, 1e5, len(part))}
         scans.append({"columns": columns, "nodes": colours | more, "translation": place})
     return write_e57(path, scans, crs=pyproj.CRS.from_epsg(25832).to_wkt())
@@ -421,3 +423,26 @@ def test_that_the_command_line_converts(tmp_path: Path, capsys: pytest.CaptureFi
     assert np.bincount(laspy.read(tmp_path / "a.laz").point_source_id).tolist() == [0, 1000, 2000]
     assert main(["convert", str(tmp_path / "a.laz"), "-o", str(tmp_path / "a.xyz")]) == 1
     assert "must end in one of .las, .laz, .ply, .e57" in capsys.readouterr().err
+
+
+def test_that_another_reader_of_e57_finds_poses_rows_and_bounds(tmp_path: Path) -> None:
+    cloud = io.read(e57(tmp_path / "scans.e57"), has_fields=True)
+    io.write(cloud, tmp_path / "a.e57")
+    file = pye57.E57(str(tmp_path / "a.e57"))
+    assert file.scan_count == 2
+    n = 0
+    for i in range(2):
+        header = file.get_header(i)
+        data = file.read_scan(
+            i, intensity=True, colors=True, row_column=True, ignore_missing_fields=True
+        )
+        found = np.stack([data[f"cartesian{axis}"] for axis in "XYZ"], axis=1)
+        rows = slice(n, n + len(found))
+        np.testing.assert_allclose(found, cloud.world(cloud.xyz[rows]), rtol=0, atol=1e-8)
+        np.testing.assert_array_equal(data["rowIndex"], cloud.fields["rowIndex"].values[rows])
+        bounds = [header.cartesianBounds[f"{a}{e}"].value() for e in ENDS for a in "xyz"]
+        local = found - header.translation
+        expected = [*local.min(axis=0), *local.max(axis=0)]
+        np.testing.assert_allclose(bounds, expected, rtol=0, atol=1e-8)
+        n += len(found)
+    assert n == N

@@ -19,6 +19,11 @@ from pipecore.types import Array, PointCloud
 NAMESPACE = "urn:pipegui:fields"
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _COLOURS = ("colorRed", "colorGreen", "colorBlue")
+_STANDARD = {
+    *("rowIndex", "columnIndex", "returnIndex", "returnCount"),
+    *("timeStamp", "isTimeStampInvalid", "isIntensityInvalid", "isColorInvalid"),
+}
+"""Fields that the format itself has; others are those of an extension."""
 POSITION_STEP = 2.0**-20
 """Positions of scanners are rounded to this, a micrometre, so that taking them off and adding
 them again changes no bit of a coordinate."""
@@ -80,7 +85,7 @@ def _write_root(
     done = 0
     for name, position, rows in _scans(cloud):
         scan = _Scan(libe57, image, cloud, place, columns, position)
-        data.append(scan.node(name))
+        data.append(scan.node(name, rows))
         for start in range(0, len(rows), CHUNK_POINTS):
             progress.update("writing", (done + start) / max(len(cloud), 1))
             scan.write(rows[start : start + CHUNK_POINTS])
@@ -147,11 +152,13 @@ class _Scan:
             self._values[f"{KEY}:classification"] = cloud.classification
         if cloud.station is not None and _is_one_scan(cloud):
             self._values[f"{KEY}:station"] = cloud.station
-        self._values |= {f"{KEY}:{column.name}": column.values for column in columns}
+        for column in columns:
+            is_standard = column.field in _STANDARD
+            self._values[column.name if is_standard else f"{KEY}:{column.name}"] = column.values
         self._buffers: dict[str, NDArray[Any]] = {}
         self._writer: Any = None
 
-    def node(self, name: str) -> Any:
+    def node(self, name: str, rows: NDArray[np.intp]) -> Any:
         """The scan's node, before its points."""
         e57, image = self._libe57, self._image
         scan = e57.StructureNode(image)
@@ -173,8 +180,28 @@ class _Scan:
             if np.isfinite([low, high]).all():
                 limits = {"intensityMinimum": low, "intensityMaximum": high}
                 scan.set("intensityLimits", self._floats(limits))
+        bounds = self._bounds(rows)
+        if np.isfinite(bounds).all():
+            names = [f"{axis}{end}" for end in ("Minimum", "Maximum") for axis in "xyz"]
+            limits = dict(zip(names, bounds.ravel(), strict=True))
+            scan.set("cartesianBounds", self._floats(limits))
         self._points(scan)
         return scan
+
+    def _bounds(self, rows: NDArray[np.intp]) -> Array:
+        """Lowest and highest coordinates in the scanner's frame, shape (2, 3)."""
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for start in range(0, len(rows), CHUNK_POINTS):
+            xyz = self._xyz(rows[start : start + CHUNK_POINTS])
+            low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
+        return np.array([low, high])
+
+    def _xyz(self, rows: NDArray[np.intp]) -> Array:
+        """Coordinates of some points in the scanner's frame, metres."""
+        # Rows are ascending: a slice of the cloud holds them, often nothing else.
+        span = slice(int(rows[0]), int(rows[-1]) + 1)
+        xyz = self._place.coordinates(self._cloud, span) * self._place.unit.factors
+        return np.asarray(xyz[rows - span.start] - self._shift)
 
     def _points(self, scan: Any) -> None:
         e57, image = self._libe57, self._image
@@ -215,12 +242,9 @@ class _Scan:
             points, buffers = self._keep
             self._writer = points.writer(buffers)
         n = len(rows)
-        # Rows are ascending: a slice of the cloud holds them, often nothing else.
-        span = slice(int(rows[0]), int(rows[-1]) + 1)
-        inside = rows - span.start
-        xyz = self._place.coordinates(self._cloud, span) * self._place.unit.factors
+        xyz = self._xyz(rows)
         for i, axis in enumerate(_AXES):
-            self._buffers[axis][:n] = xyz[inside, i] - self._shift[i]
+            self._buffers[axis][:n] = xyz[:, i]
         for name, values in self._values.items():
             self._buffers[name][:n] = values[rows]
         self._writer.write(n)
