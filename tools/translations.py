@@ -30,7 +30,14 @@ from pipecore.settings import (
     StationSource,
     iterate_fields,
 )
-from pipecore.types import KIND_LABELS, DeformationKind, ElementKind, ReviewState, Verdict
+from pipecore.types import (
+    KIND_LABELS,
+    DeformationKind,
+    ElementKind,
+    ReviewState,
+    SeenBy,
+    Verdict,
+)
 from pipegui.i18n.texts import DOMAIN, LANGUAGES
 from pipegui.model.document import Background, ColourBy
 from pipegui.model.presets import Presets
@@ -77,7 +84,7 @@ def tables() -> Iterator[str]:
         StationSource,
     ):
         yield from (str(value) for value in enum)
-    for enum in (ElementKind, DeformationKind, Verdict, ReviewState):
+    for enum in (ElementKind, DeformationKind, SeenBy, Verdict, ReviewState):
         yield from (str(value) for value in enum)
     yield from KIND_LABELS.values()
     yield from MEASURE_TEXTS.values()

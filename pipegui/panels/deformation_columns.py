@@ -234,6 +234,14 @@ COLUMNS = (
         field="strain",
         is_shown_first=False,
     ),
+    _text(
+        "seen_by",
+        mark("Seen by"),
+        lambda r: ", ".join(tr(c) for c in r.deformation.seen_by),
+        hint=mark("The criteria that show it: the deviation map, and what profiles show."),
+        plain=lambda r: "+".join(r.deformation.seen_by),
+        is_shown_first=False,
+    ),
     TableColumn(
         "fitting",
         mark("Nearest fitting"),

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipecore.deformation.contour import Contour, inner_rows
 from pipecore.deformation.deviation_map import Grid
+from pipecore.deformation.free_sections import FreeSections
 from pipecore.geometry import Array
 
 KINK_ADVANTAGE = 20.0
@@ -17,8 +18,11 @@ MAX_KINK_SHARE = 0.6
 CENTRE_KNOTS = 1.5
 """Diameters between the knots of the contour that the line of centres is taken from."""
 
-ROUNDED = 0.75
-"""Diameters to either side of a kink over which the smooth contour rounds it."""
+ROUNDED = 0.25
+"""Diameters to either side of a kink over which profiles show both of its arms."""
+
+MAX_BINS = 60
+"""Profiles are pooled into at most so many places along the line."""
 
 MIN_KINK = np.deg2rad(0.3)
 MIN_BOW_RATIO = 0.001
@@ -44,13 +48,15 @@ class CentreLine:
     explained: float
 
 
-def measure_centre_line(contour: Contour) -> CentreLine:
+def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
     """Measure how far the line of centres leaves the chord of its ends.
 
     Parameters
     ----------
     contour : Contour
         Fitted with a constant radius.
+    sections : FreeSections
+        Of the same surface, dents left out: the contour would round a kink's corner.
 
     Returns
     -------
@@ -69,7 +75,7 @@ def measure_centre_line(contour: Contour) -> CentreLine:
     variance = [max(float(side @ covariance[i] @ side), LEAST_SD**2) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
-    shape = _shape_of(s, deviation @ side, covariance, side, contour.grid)
+    shape = _shape_of(*_binned(contour, sections, side), contour.grid)
     if shape.kink is not None:
         knee, sag, sag_sd = shape.kink
         return CentreLine(sag, max(sag_sd, float(sd)), knee, clock, True, shape.explained)
@@ -91,18 +97,26 @@ class _Shape:
     kink: tuple[float, float, float] | None
 
 
-def _shape_of(s: Array, lateral: Array, covariance: Array, side: Array, grid: Grid) -> _Shape:
+def _binned(contour: Contour, sections: FreeSections, side: Array) -> tuple[Array, Array, Array]:
+    """Chainages, and centres of pooled profiles to one side with their standard deviations."""
+    inner = np.flatnonzero(inner_rows(contour.grid))
+    size = max(1, -(-len(inner) // MAX_BINS)) // 2 * 2 + 1
+    middles = inner[size // 2 :: size]
+    centre, covariance = sections.pooled(size).centres(contour.terms[:, 0])
+    middles = middles[np.isfinite(centre[middles, 0])]
+    variance = np.einsum("k,rkl,l->r", side, covariance[middles], side)
+    sd = np.sqrt(np.maximum(variance, LEAST_SD**2))
+    return contour.grid.chainages[middles], centre[middles] @ side, sd
+
+
+def _shape_of(s: Array, lateral: Array, sd: Array, grid: Grid) -> _Shape:
     """Compare the line of centres with smooth bows and with two straight pieces.
 
     The bows are those of a beam under an even load however its ends are held, and of
     parts of one: curves of the fourth degree. The kink is given as chainage, sag and its deviation.
     """
-    step = max(1, len(s) // 40)
-    s, lateral = s[::step], lateral[::step]
     if len(s) < 8:
         return _Shape(0.0, None)
-    variance = np.einsum("k,rkl,l->r", side, covariance[::step], side)
-    sd = np.sqrt(np.maximum(variance, LEAST_SD**2))
     x = (s - s[0]) / (s[-1] - s[0])
     y = lateral / sd
     waves, _ = np.linalg.qr(np.stack([x**k for k in range(5)], axis=1) / sd[:, None])
@@ -130,8 +144,8 @@ def _measure_kink(
 ) -> tuple[float, float, float]:
     """Chainage of a kink, its sag from end to end of the element, and the sag's deviation.
 
-    The contour is smooth and rounds the corner: the two straight pieces are measured away
-    from it, where they are long enough. `turn` is what they turn by if they are not.
+    Profiles across the corner show both pieces: these are measured away from it, where they
+    are long enough. `turn` is what they turn by if they are not.
     """
     away = np.abs(s - knee) > ROUNDED * 2 * grid.radius
     sides = [np.flatnonzero(away & (s < knee)), np.flatnonzero(away & (s > knee))]
@@ -145,8 +159,6 @@ def _measure_kink(
     variance = 0.0
     for side in sides:
         span = float(np.ptp(s[side]))
-        # Rows within a knot's distance share their noise.
-        n_apart = max(2.0, span / (CENTRE_KNOTS * 2 * grid.radius))
-        variance += 12 * float(np.mean(sd[side] ** 2)) / (n_apart * span**2)
+        variance += 12 * float(np.mean(sd[side] ** 2)) / (len(side) * span**2)
     arm = knee * (grid.length - knee) / grid.length
     return knee, turn * arm, float(np.sqrt(variance)) * arm

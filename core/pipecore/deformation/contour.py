@@ -127,21 +127,24 @@ class Contour:
 
 
 def harmonics(clock: Array, n_terms: int) -> Array:
-    """Return 1, cos θ, sin θ, cos 2θ, sin 2θ at clock angles.
+    """Return 1, cos θ, sin θ, cos 2θ, sin 2θ … at clock angles.
 
     Parameters
     ----------
     clock : ndarray, shape (n,)
         Radians.
     n_terms : int
-        How many of them, up to five.
+        How many of them, an odd number.
 
     Returns
     -------
     ndarray, shape (n, n_terms)
     """
-    columns = [np.ones_like(clock), np.cos(clock), np.sin(clock), np.cos(2 * clock)]
-    return np.stack([*columns, np.sin(2 * clock)][:n_terms], axis=1)
+    angle = clock[:, None] * np.arange(1, n_terms // 2 + 1)
+    columns = np.empty((len(clock), n_terms))
+    columns[:, 0] = 1.0
+    columns[:, 1::2], columns[:, 2::2] = np.cos(angle), np.sin(angle)
+    return columns
 
 
 def oval_knot_diameters(grid: Grid) -> float:

@@ -14,11 +14,30 @@ from pipecore.deformation.contour import (
     oval_knot_diameters,
     usable_arc,
 )
+from pipecore.deformation.criteria import ProfileCriteria
 from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
 from pipecore.deformation.element_surface import ElementSurface, find_element_surface
+from pipecore.deformation.free_sections import FreeSections
+from pipecore.deformation.hidden_ovality import (
+    MAX_HIDDEN_OVALITY,
+    faked_bow,
+    may_be_ovality,
+)
+from pipecore.deformation.merging import merge
 from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
 from pipecore.deformation.patches import Patch, find_patches
-from pipecore.deformation.records import describe_bow, describe_oval, describe_patch
+from pipecore.deformation.profile_shapes import (
+    crumpled_stretches,
+    free_oval_stretches,
+    measured_freely,
+    turn_along,
+)
+from pipecore.deformation.records import (
+    describe_bow,
+    describe_crumple,
+    describe_oval,
+    describe_patch,
+)
 from pipecore.deformation.unrolled_points import UnrolledPoints, surface_distance, unroll
 from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.reasons import Reason
@@ -132,10 +151,14 @@ def find_deformations(
 
     patches, contour = search(KNOT_DIAMETERS)
     min_ovality = settings.min_ovality_pct / 100
-    stretches = oval_stretches(contour, min_ovality) if n_terms == 5 else []
+    criteria = ProfileCriteria.of(heights, settings.significance)
+    free = free_oval_stretches(criteria, min_ovality)
+    stretches = _of_both(oval_stretches(contour, min_ovality) if n_terms == 5 else [], free)
     if stretches:
         patches, contour = search(oval_knot_diameters(surface.grid))
-        stretches = oval_stretches(contour, min_ovality)
+        stretches = _of_both(oval_stretches(contour, min_ovality), free)
+        stretches = [measured_freely(o, criteria) for o in stretches]
+        stretches = [o for o in stretches if o.ovality >= min_ovality]
         patches = [p for p in patches if not _is_of_ovality(p, stretches, surface.grid)]
 
     least = settings.min_depth_mm / 1000
@@ -144,15 +167,24 @@ def find_deformations(
         for p in patches
         if abs(p.bump.height) >= max(least, MIN_DEPTH_SD * p.bump.height_sd)
         and _arc_at(heights, p) >= MIN_DENT_ARC
+        and not (n_terms == 3 and may_be_ovality(p))
     ]
     ovality, ovality_sd, why_no_ovality = _mean_ovality(contour, arc)
-    deformations += [describe_oval(element, surface, contour, o) for o in stretches]
+    deformations += [
+        describe_oval(element, surface, contour, o, is_twisted=turn_along(o, criteria) != 0.0)
+        for o in stretches
+    ]
     straightness, why_not_straight = np.nan, NO_REASON
     if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
         straightness, why_not_straight, bow = _measure_bow(
             element, surface, heights, patches, n_terms=n_terms, settings=settings
         )
         deformations = [d for d in deformations if not _is_of_kink(d, bow, surface.grid)] + bow
+    crumples = [
+        describe_crumple(element, surface, contour, c)
+        for c in crumpled_stretches(criteria, heights, least)
+    ]
+    deformations = merge(deformations, crumples, criteria)
 
     deviation = np.full(len(xyz), np.nan, np.float32)
     inliers = surface.belongs
@@ -183,6 +215,12 @@ def find_deformations(
         if element.kind in SEARCHED
         else {},
     )
+
+
+def _of_both(smooth: list[OvalStretch], free: list[OvalStretch]) -> list[OvalStretch]:
+    """Oval stretches of the contour, and those of free sections that it missed."""
+    missed = [o for o in free if not any(o.first <= s.last and s.first <= o.last for s in smooth)]
+    return sorted((*smooth, *missed), key=lambda o: o.first)
 
 
 def _arcs(heights: DeviationMap) -> Array:
@@ -259,7 +297,7 @@ def _is_of_ovality(patch: Patch, stretches: list[OvalStretch], grid: Grid) -> bo
     return any(
         oval.first * grid.row_size - diameter < patch.chainage
         and patch.chainage < oval.last * grid.row_size + diameter
-        and abs(patch.bump.height) < oval.ovality * grid.radius / 2
+        and abs(patch.bump.height) < oval.ovality * grid.radius
         for oval in stretches
     )
 
@@ -297,7 +335,8 @@ def _measure_bow(
         knot_diameters=CENTRE_KNOTS,
         constant_radius=True,
     )
-    line = measure_centre_line(contour)
+    undented = replace(heights, in_contact=heights.in_contact | ~used)
+    line = measure_centre_line(contour, FreeSections.of(undented))
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
     if line.straightness_sd > settings.min_depth_mm / 1000:
         why = Reason(
@@ -306,6 +345,14 @@ def _measure_bow(
         return np.nan, why, []
     if line.straightness < max(least, settings.significance * line.straightness_sd):
         return line.straightness, NO_REASON, []
+    hidden = 0.0 if n_terms == 5 else faked_bow(heights)
+    if line.straightness < hidden + settings.significance * line.straightness_sd:
+        why = Reason(
+            "an ovality of {ovality} %, which so short an arc cannot show, may be {size} mm of it",
+            ovality=f"{100 * MAX_HIDDEN_OVALITY:.0f}",
+            size=f"{1000 * min(hidden, line.straightness):.0f}",
+        )
+        return np.nan, why, []
     is_short = grid.length < MIN_BOW_LENGTH * 2 * grid.radius
     if is_short or line.explained < MIN_EXPLAINED:
         return line.straightness, NO_REASON, []

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipecore.deformation.contour import Contour
+from pipecore.deformation.free_sections import offset_terms
 from pipecore.geometry import Array
 
 MIN_ARC = np.deg2rad(200.0)
@@ -47,12 +48,18 @@ def ovality_along(contour: Contour) -> tuple[Array, Array, Array]:
         Ratios (Dmax - Dmin) / Dnom with their standard deviations, and the clock angle of the
         largest diameter, radians.
     """
-    a2, b2 = contour.terms[:, 3], contour.terms[:, 4]
+    a2, b2 = (contour.terms[:, 3:5] - _of_offsets(contour)).T
     variance = np.trace(contour.term_covariance[:, 3:5, 3:5], axis1=1, axis2=2) / 2
     amplitude = np.sqrt(np.maximum(a2**2 + b2**2 - variance, 0.0))
     to_ratio = 2.0 / contour.grid.radius
     clock = np.mod(np.arctan2(b2, a2) / 2, 2 * np.pi)
     return amplitude * to_ratio, np.sqrt(variance) * to_ratio, clock
+
+
+def _of_offsets(contour: Contour) -> Array:
+    """What the centres' offsets from the axis alone add to second harmonics, shape (rows, 2)."""
+    terms = contour.terms
+    return offset_terms(terms[:, 1], terms[:, 2], contour.grid.radius)[:, 3:5]
 
 
 def mean_ovality(contour: Contour) -> tuple[float, float]:
@@ -69,7 +76,7 @@ def mean_ovality(contour: Contour) -> tuple[float, float]:
         Ratio (Dmax - Dmin) / Dnom and its standard deviation.
     """
     weights = contour.basis.mean
-    mean = (weights @ contour.coefficients)[3:5]
+    mean = (weights @ contour.coefficients)[3:5] - _of_offsets(contour).mean(axis=0)
     covariance = np.einsum("a,akbl,b->kl", weights, contour.covariance, weights)[3:5, 3:5]
     variance = float(np.trace(covariance)) / 2
     amplitude = np.sqrt(max(float(mean @ mean) - variance, 0.0))

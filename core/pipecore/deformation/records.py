@@ -8,10 +8,11 @@ from pipecore.deformation.contour import Contour
 from pipecore.deformation.element_surface import ElementSurface
 from pipecore.deformation.ovality import OvalStretch
 from pipecore.deformation.patches import Patch
+from pipecore.deformation.profile_shapes import CrumpledStretch
 from pipecore.deformation.strain import dent_strain
 from pipecore.geometry import Array, surface_points
 from pipecore.reasons import Reason
-from pipecore.types import NO_ID, Deformation, DeformationKind, Element
+from pipecore.types import NO_ID, Deformation, DeformationKind, Element, SeenBy
 
 STRAIN_SIGNIFICANCE = 5.0
 """Least depth over its standard deviation that a strain is given for."""
@@ -52,6 +53,7 @@ def describe_patch(
         deformation_id=NO_ID,
         element_id=element.element_id,
         kind=DeformationKind.DENT if bump.height < 0 else DeformationKind.BULGE,
+        seen_by=(SeenBy.MAP,),
         chainage=patch.chainage,
         chainage_start=max(patch.chainage - patch.span / 2, 0.0),
         chainage_end=min(patch.chainage + patch.span / 2, element.axis.length),
@@ -71,7 +73,12 @@ def describe_patch(
 
 
 def describe_oval(
-    element: Element, surface: ElementSurface, contour: Contour, oval: OvalStretch
+    element: Element,
+    surface: ElementSurface,
+    contour: Contour,
+    oval: OvalStretch,
+    *,
+    is_twisted: bool,
 ) -> Deformation:
     """Return an oval stretch as it is reported; its depth is how far it leaves the circle.
 
@@ -82,6 +89,8 @@ def describe_oval(
     contour : Contour
         That it was measured on.
     oval : OvalStretch
+    is_twisted : bool
+        Whether its direction turns along it.
 
     Returns
     -------
@@ -93,7 +102,8 @@ def describe_oval(
     return Deformation(
         deformation_id=NO_ID,
         element_id=element.element_id,
-        kind=DeformationKind.OVALITY,
+        kind=DeformationKind.TWIST if is_twisted else DeformationKind.OVALITY,
+        seen_by=(SeenBy.AXES,),
         chainage=chainage,
         chainage_start=oval.first * grid.row_size,
         chainage_end=(oval.last + 1) * grid.row_size,
@@ -106,6 +116,45 @@ def describe_oval(
         ovality=oval.ovality,
         n_points=int(np.count_nonzero((row >= oval.first) & (row <= oval.last))),
         significance=oval.z,
+    )
+
+
+def describe_crumple(
+    element: Element, surface: ElementSurface, contour: Contour, stretch: CrumpledStretch
+) -> Deformation:
+    """Return a crumple as it is reported; its depth is that of its largest ring.
+
+    Parameters
+    ----------
+    element : Element
+    surface : ElementSurface
+    contour : Contour
+    stretch : CrumpledStretch
+
+    Returns
+    -------
+    Deformation
+    """
+    grid = surface.grid
+    chainage = float(grid.chainages[stretch.peak])
+    row = surface.cell[surface.belongs] // grid.n_columns
+    start, end = stretch.first * grid.row_size, (stretch.last + 1) * grid.row_size
+    return Deformation(
+        deformation_id=NO_ID,
+        element_id=element.element_id,
+        kind=DeformationKind.CRUMPLE,
+        seen_by=(SeenBy.AXES,),
+        chainage=chainage,
+        chainage_start=start,
+        chainage_end=end,
+        clock=stretch.clock,
+        peak=_peak_point(element, contour, chainage, stretch.clock, stretch.height),
+        depth=abs(stretch.height),
+        depth_sd=stretch.sd,
+        length=end - start,
+        width=2 * np.pi * grid.radius,
+        n_points=int(np.count_nonzero((row >= stretch.first) & (row <= stretch.last))),
+        significance=abs(stretch.height) / stretch.sd,
     )
 
 
@@ -131,6 +180,7 @@ def describe_bow(
         deformation_id=NO_ID,
         element_id=element.element_id,
         kind=DeformationKind.KINK if line.is_kink else DeformationKind.BOW,
+        seen_by=(SeenBy.CENTRES,),
         chainage=line.chainage,
         chainage_start=0.0,
         chainage_end=grid.length,

@@ -133,6 +133,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
         PageColumn("Clock"),
         PageColumn("Length × width (mm)"),
         PageColumn(f"Position x, y, z ({place.unit})"),
+        PageColumn("Seen by", numeric=False),
         PageColumn("Remarks", numeric=False),
     ]
     has_strain = any(np.isfinite(d.strain) for d in result.deformations)
@@ -153,6 +154,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
             format_clock(d.clock),
             f"{_whole_mm(d.length)} × {_whole_mm(d.width)}",
             place.display(d.peak),
+            ", ".join(d.seen_by),
             "; ".join(_remarks(d, result)),
         ]
         rows.append(row + ([_number_or_blank(100 * d.strain)] if has_strain else []))

@@ -7,7 +7,14 @@ that the scan cannot carry are nan, never a guess.
 
 from pipecore.types.arrays import Array, Floats
 from pipecore.types.cloud import Field, PointCloud, Reading, Storage
-from pipecore.types.deformation import Deformation, DeformationKind, Review, ReviewState, Verdict
+from pipecore.types.deformation import (
+    Deformation,
+    DeformationKind,
+    Review,
+    ReviewState,
+    SeenBy,
+    Verdict,
+)
 from pipecore.types.element import KIND_LABELS, Element, ElementKind, NominalSize
 from pipecore.types.ids import NO_ID
 from pipecore.types.profiles import Profiles
@@ -32,6 +39,7 @@ __all__ = [
     "Result",
     "Review",
     "ReviewState",
+    "SeenBy",
     "Stack",
     "Storage",
     "Verdict",

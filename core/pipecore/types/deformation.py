@@ -21,6 +21,27 @@ class DeformationKind(StrEnum):
     OVALITY = "ovality"
     BOW = "bow"
     KINK = "kink"
+    CRUMPLE = "crumple"
+    """Rings of larger and smaller radius in turn."""
+    TWIST = "twist"
+    """Ovality whose direction turns along the pipe."""
+    CRUSHED = "crushed"
+    """Too far gone to be one of the others."""
+
+
+class SeenBy(StrEnum):
+    """What saw a deformation; the values are those of the report."""
+
+    MAP = "map"
+    """The deviation map."""
+    CENTRES = "centres"
+    """Centres of profiles that leave the axis (paper, figure 8)."""
+    AXES = "axes"
+    """Semi-axes that shrink or grow against the element's pattern (paper, figures 7 and 13)."""
+    CURVATURE = "curvature"
+    """Curvature that varies around the section (paper, figures 14 and 15)."""
+    GAP = "gap"
+    """Profiles that are missing inside the pipe (paper, figure 11)."""
 
 
 class Verdict(StrEnum):
@@ -72,6 +93,10 @@ class Deformation(Summarised):
         Distance over the surface from edge to edge of the two, metres; 0 if they overlap.
     interacts : bool
         Whether that is at most one outside diameter.
+    seen_by : tuple of SeenBy
+        What saw it, in the order of `SeenBy`.
+    dmax, dmin : float
+        Largest and smallest diameter in its profiles, metres; nan where the arc cannot carry them.
     not_measurable : mapping of str to Reason
         Why what is nan could not be measured, by the name of the field; what does not
         apply to the kind is not in it. Empty where all was measured.
@@ -102,6 +127,9 @@ class Deformation(Summarised):
     next_id: int = NO_ID
     next_distance: float = np.nan
     interacts: bool = False
+    seen_by: tuple[SeenBy, ...] = ()
+    dmax: float = np.nan
+    dmin: float = np.nan
     not_measurable: Mapping[str, Reason] = field(default_factory=dict)
 
     def _title(self) -> str:
