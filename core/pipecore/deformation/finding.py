@@ -11,6 +11,7 @@ from pipecore.deformation.contour import (
     KNOT_DIAMETERS,
     Contour,
     fit_contour,
+    inner_rows,
     oval_knot_diameters,
     usable_arc,
 )
@@ -24,7 +25,13 @@ from pipecore.deformation.hidden_ovality import (
     may_be_ovality,
 )
 from pipecore.deformation.merging import merge
-from pipecore.deformation.ovality import MIN_ARC, OvalStretch, mean_ovality, oval_stretches
+from pipecore.deformation.ovality import (
+    MIN_ARC,
+    OvalStretch,
+    mean_ovality,
+    oval_stretches,
+    true_ranges,
+)
 from pipecore.deformation.patches import Patch, find_patches
 from pipecore.deformation.profile_shapes import (
     crumpled_stretches,
@@ -55,6 +62,9 @@ MIN_DEPTH_SD = 3.0
 MIN_DENT_ARC = np.deg2rad(100.0)
 MAX_SHORT_ARC = 0.2
 """Where less arc is seen, the contour follows a dent; reported from this fraction of the length."""
+
+MIN_PROFILE_ARC, MIN_UNSEEN_RADII = np.deg2rad(40.0), 0.5
+"""A profile is measured from this arc on; shorter stretches without one are not told."""
 
 MIN_BOW_LENGTH = 6.0
 """In diameters: the line of a shorter stub hangs on what touches it."""
@@ -209,8 +219,9 @@ def find_deformations(
                 "ovality": why_no_ovality,
                 "straightness": why_not_straight,
                 "dents": _why_no_dents(heights),
+                "profiles": _unseen_stretches(heights),
             }.items()
-            if why and (name in _applicable(element) or name == "dents")
+            if why and (name in _applicable(element) or name in ("dents", "profiles"))
         }
         if element.kind in SEARCHED
         else {},
@@ -245,6 +256,20 @@ def _why_no_dents(heights: DeviationMap) -> Reason:
         needed=f"{np.rad2deg(MIN_DENT_ARC):.0f}",
         share=f"{100 * short:.0f}",
     )
+
+
+def _unseen_stretches(heights: DeviationMap) -> Reason:
+    """Where no profile of an element could be measured; empty if all could be."""
+    grid = heights.grid
+    unseen = (_arcs(heights) < MIN_PROFILE_ARC) & inner_rows(grid)
+    stretches = [
+        f"{first * grid.row_size:.2f}–{(last + 1) * grid.row_size:.2f}"
+        for first, last in true_ranges(unseen)
+        if (last + 1 - first) * grid.row_size >= MIN_UNSEEN_RADII * grid.radius
+    ]
+    if not stretches:
+        return NO_REASON
+    return Reason("no surface seen at chainage {stretches} m", stretches=", ".join(stretches))
 
 
 def _applicable(element: Element) -> tuple[str, ...]:

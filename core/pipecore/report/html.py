@@ -212,6 +212,7 @@ def _element_table(result: Result) -> dict[str, Any]:
         PageColumn("Residual (mm)"),
         PageColumn("Ovality (%)"),
         PageColumn("Straightness (mm)"),
+        PageColumn("Not measured", numeric=False),
     ]
     worst = {
         e.element_id: min(
@@ -239,6 +240,7 @@ def _element_table(result: Result) -> dict[str, Any]:
                 format_measure(1000 * e.rms),
                 _value_or_reason(e, "ovality", format_measure(100 * e.ovality, 100 * e.ovality_sd)),
                 _value_or_reason(e, "straightness", _number_or_blank(1000 * e.straightness)),
+                e.not_measurable.get("profiles", ""),
             ]
         )
     return {"columns": columns, "rows": rows}

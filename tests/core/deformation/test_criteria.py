@@ -150,3 +150,15 @@ def test_that_an_oval_seen_from_one_side_is_told_as_no_bow(rng):
         scan.element, scan.xyz, scan.normals, (), deeper
     ).deformations}  # fmt: skip
     assert DeformationKind.BOW not in kinds
+
+
+def test_that_a_stretch_that_cannot_be_measured_is_told_with_its_place(rng):
+    scan = PipeScene(radius=R, length=LENGTH, views=VIEWS).scan(rng)
+    chainage, _, _ = scan.element.axis.pipe_coordinates(scan.xyz)
+    seen = np.abs(chainage - 1.5) > 0.2
+    finding = find_deformations(scan.element, scan.xyz[seen], scan.normals[seen], (), SETTINGS)
+    assert finding.deformations == ()
+    stretches = finding.not_measurable["profiles"].values["stretches"]
+    first, last = (float(x) for x in stretches.split("–"))
+    assert first == pytest.approx(1.3, abs=0.02)
+    assert last == pytest.approx(1.7, abs=0.02)
