@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import convolve1d
 
 from pipecore.deformation.criteria import ProfileCriteria
 from pipecore.deformation.deviation_map import DeviationMap
@@ -96,9 +97,8 @@ def _goes_round(criteria: ProfileCriteria, cells: DeviationMap, height: Array) -
     sector = np.arange(grid.n_columns) * N_SECTORS // grid.n_columns
     member = (sector[:, None] == np.arange(N_SECTORS)).astype(np.float64)
     size = n_rows_of(grid, RING_WINDOW * grid.radius)
-    kernel = np.ones(size)
     total, mass = (
-        np.apply_along_axis(np.convolve, 0, values @ member, kernel, "same")
+        convolve1d(values @ member, np.ones(size), axis=0, mode="constant")
         for values in (off, weight)
     )
     is_seen = mass > 0

@@ -54,7 +54,7 @@ def random_pipe(
     ----------
     seed : int
     kind : DeformationKind, optional
-        None for a clean pipe.
+        One that scenes have (`KIND_OF_SPEC`); None for a clean pipe.
     arc_deg : float
         Arc that is seen, 60 to 360°.
     radius : float, optional
@@ -80,7 +80,7 @@ def random_pipe(
     Raises
     ------
     SceneError
-        If the arc is out of its bounds, or the deformation does not fit on the pipe.
+        If the arc is out of its bounds, or the pipe cannot have the deformation.
     """
     if not 60 <= arc_deg <= 360:
         raise SceneError(f"A pipe can be seen over 60 to 360°, not {arc_deg:g}°.")
@@ -113,9 +113,11 @@ def random_pipe(
             spec = Ovality(ratio, clock_deg, length / 2 - half, length / 2 + half)
         elif kind is DeformationKind.BOW:
             spec = Bow(depth, clock_deg)
-        else:
+        elif kind is DeformationKind.KINK:
             angle = np.arctan(depth * length / (chainage * (length - chainage)))
             spec = Kink(chainage, float(np.rad2deg(angle)), clock_deg)
+        else:
+            raise SceneError(f"A scene’s pipe cannot have the deformation “{kind}”.")
     run = Run(
         _vector(start),
         _vector(direction),

@@ -189,6 +189,12 @@ def test_that_strain_needs_the_wall_thickness(rng):
     assert 0 < thin.strain < thick.strain < 1
 
 
+@pytest.mark.parametrize("share", [0.02, 0.1, 0.2, 0.4, 1.0])
+def test_that_a_pipe_shorter_than_what_is_pooled_along_it_is_searched_too(rng, share):
+    scan = PipeScene(0.1, share * 0.1, (0.0, 2.1, 4.2), spacing=0.004).scan(rng)
+    assert find(scan).deformations == ()
+
+
 def test_that_a_handful_of_points_gives_no_answer(rng):
     scan = dented().scan(rng)
     few = replace(scan, xyz=scan.xyz[:20], normals=scan.normals[:20])
