@@ -90,6 +90,7 @@ def handlers(
         "split": edits.split,
         "kind": edits.kind,
         "size": edits.size,
+        "answer": edits.answer,
         "detect_around": edits.detect_around,
         "detect_in_box": edits.detect_in_box,
         "accept": lambda: edits.review(ReviewState.ACCEPTED),

@@ -21,17 +21,19 @@ from pipecore.io.coordinates import UNIT_LABELS
 from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
 from pipecore.pipeline import STAGES
 from pipecore.resources import resource
-from pipecore.rules import MEASURE_TEXTS, list_rules
+from pipecore.rules import MEASURE_TEXTS, QUESTIONS, list_rules
 from pipecore.settings import (
     DirectionPreset,
     EllipseFit,
     FlaggedPoints,
     ProfileMethod,
+    SizeCatalogue,
     StationSource,
     iterate_fields,
 )
 from pipecore.types import (
     KIND_LABELS,
+    Condition,
     DeformationKind,
     ElementKind,
     ReviewState,
@@ -82,12 +84,15 @@ def tables() -> Iterator[str]:
         DirectionPreset,
         FlaggedPoints,
         StationSource,
+        SizeCatalogue,
     ):
         yield from (str(value) for value in enum)
-    for enum in (ElementKind, DeformationKind, SeenBy, Verdict, ReviewState):
+    for enum in (ElementKind, DeformationKind, SeenBy, Verdict, Condition, ReviewState):
         yield from (str(value) for value in enum)
     yield from KIND_LABELS.values()
     yield from MEASURE_TEXTS.values()
+    for text in QUESTIONS.values():
+        yield from (text.question, text.yes, text.no)
     yield from UNIT_LABELS.values()
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())

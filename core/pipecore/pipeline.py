@@ -14,7 +14,7 @@ from pipecore.elements import NearbyPoints, build_elements, propose_surfaces
 from pipecore.ellipses import Ellipses
 from pipecore.measurement import MeasuringOptions, measure_elements, tabulate_ellipses
 from pipecore.progress import NoProgress, Progress
-from pipecore.rules import Rule, judge, load_rule
+from pipecore.rules import judge_all, load_rules
 from pipecore.segments import StackOverlay
 from pipecore.settings import Settings
 from pipecore.stacks import choose_stacks
@@ -93,7 +93,7 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
         See `detect`.
     """
     cloud, timer = workspace.cloud, StepTimer()
-    rule = load_rule(settings.deformation.rule)
+    load_rules(settings.deformation.rule)  # what would fail at the end fails now
     if len(cloud) == 0:
         return _empty_result(cloud, settings)
     with timer("surface"):
@@ -128,7 +128,7 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
         measured = measure_elements(
             elements, nearby, len(cloud), measuring, progress, allocate=workspace.allocate
         )
-        deformations = judge_deformations(measured.deformations, measured.elements, rule)
+        deformations = judge_deformations(measured.deformations, measured.elements, settings)
     return Result(
         settings=settings,
         origin=cloud.origin,
@@ -168,27 +168,24 @@ def _empty_result(cloud: PointCloud, settings: Settings) -> Result:
 
 
 def judge_deformations(
-    deformations: tuple[Deformation, ...], elements: tuple[Element, ...], rule: Rule
+    deformations: tuple[Deformation, ...], elements: tuple[Element, ...], settings: Settings
 ) -> tuple[Deformation, ...]:
-    """Number the deformations, relate them to their surroundings, judge them by a rule.
+    """Number the deformations, relate them to their surroundings, judge them by the rules.
 
     Parameters
     ----------
     deformations : tuple of Deformation
     elements : tuple of Element
         All, in the order of their ids.
-    rule : Rule
+    settings : Settings
 
     Returns
     -------
     tuple of Deformation
-        With ids from 1, neighbours, rule and verdict.
+        With ids from 1, neighbours, rules and verdicts.
     """
     numbered = [replace(d, deformation_id=i) for i, d in enumerate(deformations, start=1)]
-    return tuple(
-        replace(d, rule=rule.name, verdict=judge(d, elements[d.element_id - 1], rule))
-        for d in relate_deformations(numbered, elements)
-    )
+    return judge_all(relate_deformations(numbered, elements), elements, lambda _: settings)
 
 
 class StepTimer:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.catalogues import sizes_of
+from pipecore.catalogues import sizes_of_all
 from pipecore.notes import Note
 from pipecore.settings import LengthUnit, Settings
 from pipecore.types import Element, ElementKind, PointCloud
@@ -41,7 +41,7 @@ def unit_notes(
     if cloud.crs or cloud.unit.name != "m" or settings.input.length_unit is not LengthUnit.AUTO:
         return ()
     radii = _different([e.radius for e in elements if e.kind is ElementKind.CYLINDER])
-    sizes = np.array([size.outside_diameter for size in sizes_of(str(settings.elements.catalogue))])
+    sizes = np.array([s.outside_diameter for s in sizes_of_all(settings.elements.catalogue)])
     unit = _unit_of(2 * radii, sizes)
     if unit is None:
         return ()

@@ -8,13 +8,16 @@ from collections.abc import Callable
 from PySide6.QtCore import QObject, Qt
 from PySide6.QtWidgets import QInputDialog, QWidget
 
-from pipecore.catalogues import sizes_of
-from pipecore.types import ElementKind, PointCloud, Result, ReviewState
+from pipecore.catalogues import sizes_of_all
+from pipecore.rules import QUESTIONS, questions_of
+from pipecore.types import ElementKind, PointCloud, Question, Result, ReviewState
 from pipegui.controllers.session import Session
-from pipegui.i18n.texts import format_measure, label_of, mark, tr
+from pipegui.i18n.texts import first_capital, format_measure, label_of, mark, tr
 from pipegui.model import commands, element_commands
 from pipegui.model.document import Scan
+from pipegui.model.result_queries import rules_of
 from pipegui.model.selection import elements_of
+from pipegui.panels.answers_dialog import AnswersDialog
 from pipegui.panels.project_tree import NodeKind
 from pipegui.work.job_queue import Edited
 from pipegui.work.worker import JobProgress
@@ -63,7 +66,7 @@ class ElementEdits(QObject):
         """Ask for the catalogue size of the selected element."""
         _, result, [element_id] = self._targets()
         element = result.element(element_id)
-        sizes = sizes_of(str(result.settings.elements.catalogue))
+        sizes = sizes_of_all(result.settings.elements.catalogue)
         names = [tr(NO_SIZE)]
         for s in sizes:
             od = tr("OD {od:.1f} mm").format(od=1000 * s.outside_diameter)
@@ -82,6 +85,33 @@ class ElementEdits(QObject):
                 element_commands.set_nominal_size, element_id, sizes[i - 1] if i else None
             ),
         )
+
+    def answer(self) -> None:
+        """Ask what the rules ask of the selected deformation, or of the selected element."""
+        _, result, _ = self._targets()
+        selection = self._session.document.selection
+        element = result.element(selection.element_id)
+        rules = rules_of(result, element.element_id)
+        deformation_id = selection.deformation_id
+        if deformation_id:
+            deformation = result.deformation(deformation_id)
+            title = tr("{kind} on {label}").format(
+                kind=first_capital(tr(deformation.kind)), label=label_of(element)
+            )
+            asked = questions_of(rules, deformation.kind, element)
+            known = {**element.answers, **deformation.answers}
+        else:
+            title = label_of(element)
+            asked = [q for q, text in QUESTIONS.items() if text.is_of_element]
+            known = dict(element.answers)
+        asked = [q for q in QUESTIONS if q in {*asked, Question.CLAD} and q is not Question.WALL]
+        dialog = AnswersDialog(title, asked, known, self._window)
+        dialog.answered.connect(
+            lambda answers: self._session.do(
+                element_commands.answer, deformation_id, element.element_id, answers
+            )
+        )
+        dialog.open()
 
     def review(self, state: ReviewState) -> None:
         """Accept or reject the selected deformation, or leave it open."""

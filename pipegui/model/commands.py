@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from pipecore.settings import DirectionPreset, Settings
+from pipecore.settings import JUDGING_KEYS, DirectionPreset, Settings
 from pipecore.types import NO_ID, PointCloud, Result, Review, ReviewState
 from pipegui.i18n.texts import mark
 from pipegui.model import presets
@@ -218,14 +218,33 @@ def colours_of(scan: Scan) -> tuple[ColourBy, ...]:
 @step(mark("Change settings"))
 def change_settings(document: Document, changes: Mapping[str, Any]) -> Document:
     """Change settings by dotted key; raises `SettingsError` if a value does not fit."""
-    return replace(document, settings=document.settings.replace(changes))
+    return _with_settings(document, document.settings.replace(changes))
+
+
+def _with_settings(document: Document, settings: Settings) -> Document:
+    """The document with other settings; those of judging judge all results at once."""
+    changes = {
+        key: settings.get(key)
+        for key in JUDGING_KEYS
+        if settings.get(key) != document.settings.get(key)
+    }
+    document = replace(document, settings=settings)
+    if not changes or not any(scan.result is not None for scan in document.scans):
+        return document
+    from pipecore.editing import judge_again  # noqa: PLC0415 - loads numba
+
+    judged = (
+        scan if scan.result is None else replace(scan, result=judge_again(scan.result, changes))
+        for scan in document.scans
+    )
+    return replace(document, scans=tuple(judged))
 
 
 @step(mark("Reset settings"))
 def reset_settings(document: Document) -> Document:
     """Reset all settings to their defaults, except the user's own stacks."""
     stacks = {"stacks.directions": document.settings.stacks.directions}
-    return replace(document, settings=Settings().replace(stacks))
+    return _with_settings(document, Settings().replace(stacks))
 
 
 @step(mark("Reset settings"))
@@ -238,13 +257,13 @@ def reset_keys(document: Document, keys: Iterable[str]) -> Document:
 @step(mark("Preset"))
 def apply_preset(document: Document, settings: Settings) -> Document:
     """Apply a preset, except to settings that depend on the scan."""
-    return replace(document, settings=presets.applied(document.settings, settings))
+    return _with_settings(document, presets.applied(document.settings, settings))
 
 
 @step(mark("Load settings"))
 def load_settings(document: Document, settings: Settings) -> Document:
     """Replace all settings."""
-    return replace(document, settings=settings)
+    return _with_settings(document, settings)
 
 
 @step(mark("Change directions"))

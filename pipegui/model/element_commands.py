@@ -3,10 +3,11 @@
 Edits that need the cloud's points are computed in the background and applied by `apply_edit`.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from pipecore.types import NO_ID, NominalSize, PointCloud, Result
+from pipecore.rules import QUESTIONS
+from pipecore.types import NO_ID, NominalSize, PointCloud, Question, Result
 from pipegui.i18n.texts import label_of, mark, run_label, tr
 from pipegui.model.commands import step
 from pipegui.model.document import Document, Scan
@@ -71,11 +72,34 @@ def set_nominal_size(document: Document, element_id: int, size: NominalSize | No
     """Set the catalogue size of an element."""
     from pipecore import editing  # noqa: PLC0415 - loads numba
 
-    if document.result is None or document.result.element(element_id).nominal == size:
+    if document.result is None:
+        return document
+    element = document.result.element(element_id)
+    if element.nominal == size and element.is_nominal_confirmed == (size is not None):
         return document
     return _with_result(
         document, document.active, editing.set_nominal_size(document.result, element_id, size)
     )
+
+
+@step(mark("Answer"))
+def answer(
+    document: Document,
+    deformation_id: int,
+    element_id: int,
+    answers: Mapping[Question, bool | None],
+) -> Document:
+    """Answer what the rules ask of a deformation, or of its element where they ask of that."""
+    from pipecore import editing  # noqa: PLC0415 - loads numba
+
+    result = document.result
+    assert result is not None
+    for question, said in answers.items():
+        if deformation_id and not QUESTIONS[question].is_of_element:
+            result = editing.answer_for_deformation(result, deformation_id, question, said)
+        else:
+            result = editing.answer_for_element(result, element_id, question, said)
+    return _with_result(document, document.active, result)
 
 
 @step(mark("Rename scan"))

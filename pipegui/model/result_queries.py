@@ -12,7 +12,7 @@ from pipecore import rules
 from pipecore.errors import SettingsError
 from pipecore.geometry import Array, surface_points
 from pipecore.inspection.points import ElementPoints, element_points, profile_points
-from pipecore.rules import DentLimit, Rule, load_rule
+from pipecore.rules import DentLimit, Rule, load_rules
 from pipecore.types import (
     OWN_STACK,
     Deformation,
@@ -103,18 +103,22 @@ def plotted_profiles(result: Result, element_id: int) -> Profiles:
 
 
 @lru_cache(maxsize=4)
-def _rule(name: str) -> Rule | None:
+def _rules(names: str) -> tuple[Rule, ...]:
     try:
-        return load_rule(name)
+        return load_rules(names)
     except SettingsError:  # the user's own file may be gone since
-        return None
+        return ()
+
+
+def rules_of(result: Result, element_id: int) -> tuple[Rule, ...]:
+    """Return the rules that judge an element's deformations; none if a file of one is gone."""
+    return _rules(result.settings_of(element_id).deformation.rule)
 
 
 @cached_with_owner(maxsize=32)
 def dent_limit(result: Result, element_id: int) -> DentLimit | None:
-    """Return the strictest limit that the result's rule sets on an element's dents."""
-    rule = _rule(result.settings.deformation.rule)
-    return None if rule is None else rules.dent_limit(result.element(element_id), rule)
+    """Return the strictest limit that the result's rules set on an element's dents."""
+    return rules.dent_limit(result.element(element_id), rules_of(result, element_id))
 
 
 def stack_name(result: Result, stack_id: int) -> str:

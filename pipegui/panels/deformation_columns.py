@@ -16,6 +16,7 @@ from pipecore.rules import outside_diameter
 from pipecore.types import Deformation, Element, Result, Review, ReviewState
 from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
+from pipegui.states.verdict_texts import verdict_text
 
 REVIEW_ORDER = tuple(ReviewState)
 
@@ -181,7 +182,7 @@ COLUMNS = (
     _number(
         "depth_pct_od",
         mark("% OD"),
-        lambda r: 100 * r.deformation.depth / outside_diameter(r.element),
+        lambda r: 100 * r.deformation.depth / outside_diameter(r.element, r.deformation.chainage),
         1,
         mark("Depth or height in percent of the outside diameter"),
     ),
@@ -278,7 +279,7 @@ COLUMNS = (
     _text(
         "verdict",
         mark("Verdict"),
-        lambda r: tr(r.deformation.verdict),
+        lambda r: verdict_text(r.deformation),
         lambda r: (VERDICT_ORDER.index(r.deformation.verdict), -r.deformation.depth),
         plain=lambda r: r.deformation.verdict,
     ),

@@ -20,6 +20,7 @@ from pipecore.report.summary import by_verdict
 from pipecore.types import Deformation, DeformationKind, Result, Review, ReviewState, Verdict
 from pipegui.i18n.texts import tr
 from pipegui.panels.deformation_columns import COLUMNS, INDEX, Row
+from pipegui.states.verdict_texts import why_text
 from pipegui.style import theme
 
 Index = QModelIndex | QPersistentModelIndex
@@ -154,7 +155,7 @@ class DeformationModel(QAbstractTableModel):
         if text == tr(NOT_MEASURABLE):
             return COLUMNS[column].why_not(row)
         if column == VERDICT_COLUMN and row.deformation.rule:
-            return tr("By the rule “{rule}”").format(rule=row.deformation.rule)
+            return why_text(row.deformation)
         return tr(COLUMNS[column].hint) or (text if column == COMMENT_COLUMN else None)
 
     def setData(self, index: Index, value: Any, role: int = Role.EditRole) -> bool:  # noqa: N802

@@ -17,9 +17,10 @@ from PySide6.QtWidgets import (
 )
 
 from pipecore.rules import list_rules
-from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipegui.i18n.texts import mark, tr
 from pipegui.panels.preset_bar import PresetBar
+from pipegui.panels.several_field import SeveralField
 from pipegui.panels.widgets import Applying, QuietComboBox, QuietSpinBox
 from pipegui.style import theme
 
@@ -141,7 +142,13 @@ class SettingsForm(QScrollArea):
         if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
             return self._choice(key, [(tr(value), value) for value in spec.kind])
         if key == "deformation.rule":
-            return self._choice(key, [(tr(rule.title), rule.name) for rule in list_rules()])
+            return self._several(
+                key,
+                [(tr(rule.title), rule.name) for rule in list_rules()],
+                file_filter=tr("Acceptance rules") + " (*.toml)",
+            )
+        if choices := choices_of(spec.kind):
+            return self._several(key, [(tr(value), value) for value in choices])
         if spec.kind is float:
             return self._number(key, spec)
         return self._text(key)
@@ -163,6 +170,21 @@ class SettingsForm(QScrollArea):
 
         self._show[key] = show
         field.currentIndexChanged.connect(lambda i: self._tell(key, values[i]))
+        return field
+
+    def _several(self, key: str, choices: list[tuple[str, str]], file_filter: str = "") -> QWidget:
+        """A field of several choices; a setting that is a text has them between commas."""
+        field = SeveralField(choices, file_filter)
+        is_text = self._specs[key].kind is str
+
+        def show(value: Any) -> None:
+            names = [name.strip() for name in value.split(",")] if is_text else value
+            field.show_values(names)
+
+        self._show[key] = show
+        field.changed.connect(
+            lambda values: self._tell(key, ", ".join(values) if is_text else values)
+        )
         return field
 
     def _number(self, key: str, spec: FieldSpec) -> QWidget:
@@ -215,9 +237,14 @@ def _help(spec: FieldSpec) -> str:
         lines.append(tr("at least {minimum:g}{unit}").format(minimum=spec.minimum, unit=unit))
     default = tr(spec.zero_means) if spec.zero_means and spec.default == 0 else None
     if default is None:
-        default = f"{spec.default:.4g}{unit}" if spec.kind is float else tr(str(spec.default))
+        default = f"{spec.default:.4g}{unit}" if spec.kind is float else _named(spec.default)
     lines.append(tr("Default: {default}").format(default=default))
     return "\n".join(lines)
+
+
+def _named(default: Any) -> str:
+    """A default that is a text, a choice or several."""
+    return ", ".join(map(tr, default)) if isinstance(default, tuple) else tr(str(default))
 
 
 class _Fold(QWidget):

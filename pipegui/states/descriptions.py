@@ -16,7 +16,7 @@ from pipecore.formatting import (
 from pipecore.geometry import ArcAxis, Array
 from pipecore.inspection.section import radius_is_measurable
 from pipecore.rules import outside_diameter
-from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipecore.types import (
     Deformation,
     DeformationKind,
@@ -33,6 +33,7 @@ from pipegui.model.document import Scan, Selection
 from pipegui.model.result_queries import stack_name
 from pipegui.model.view_commands import extent
 from pipegui.states.unit_texts import unit_text
+from pipegui.states.verdict_texts import conditions_text, verdict_text, why_text
 from pipegui.states.view_state import PropertiesState
 
 OVALITY = "(Dmax − Dmin) / Dnom"
@@ -235,9 +236,19 @@ def _of_element(element: Element, result: Result) -> Iterator[Property]:
         yield _measure(tr("Radius at end"), element.radius_end, element.radius_sd)
     if element.nominal is not None:
         od = tr("OD {od:.1f} mm").format(od=1000 * element.nominal.outside_diameter)
-        yield Property(tr("Nominal size"), f"{element.nominal.name} ({od})", element.nominal.name)
+        name = element.nominal.name
+        if element.nominal_end is not None:
+            name += f" → {element.nominal_end.name}"
+        by = tr("Chosen by a person.") if element.is_nominal_confirmed else ""
+        yield Property(tr("Nominal size"), f"{name} ({od})", name, hint=by)
     else:
         yield Property(tr("Nominal size"), tr("none within tolerance"))
+    if element.other_nominal is not None:
+        od = tr("OD {od:.1f} mm").format(od=1000 * element.other_nominal.outside_diameter)
+        other = f"{element.other_nominal.name} ({od})"
+        yield Property(tr("Or"), other, hint=tr("The measurement does not rule this size out."))
+    if element.answers:
+        yield Property(tr("Answers"), conditions_text(element.answers))
     if isinstance(element.axis, ArcAxis):
         yield _measure(tr("Bend radius"), element.axis.bend_radius)
         yield _measure(tr("Bend angle"), element.axis.bend_angle, unit="°")
@@ -283,6 +294,8 @@ def _setting(settings: Settings, key: str, spec: FieldSpec) -> str:
     value = settings.get(key)
     if value == 0 and spec.zero_means:
         return tr(spec.zero_means)
+    if choices_of(spec.kind) is not None:
+        return ", ".join(value)
     if isinstance(value, tuple):
         return str(len(value))
     text = f"{value:g}" if isinstance(value, float) else tr(str(value))
@@ -292,10 +305,19 @@ def _setting(settings: Settings, key: str, spec: FieldSpec) -> str:
 def _of_deformation(
     deformation: Deformation, element: Element, result: Result
 ) -> Iterator[Property]:
-    share = 1 / outside_diameter(element)
+    share = 1 / outside_diameter(element, deformation.chainage)
     verdict = deformation.verdict
-    rule = tr("By the rule “{rule}”").format(rule=deformation.rule)
-    yield Property(tr("Verdict"), tr(verdict), str(verdict), hint=rule, verdict=verdict)
+    yield Property(
+        tr("Verdict"),
+        verdict_text(deformation),
+        str(verdict),
+        hint=why_text(deformation),
+        verdict=verdict,
+    )
+    if deformation.verdict_reason:
+        yield Property(tr("To look at"), reason_text(deformation.verdict_reason))
+    if deformation.answers:
+        yield Property(tr("Answers"), conditions_text(deformation.answers))
     is_bulge = deformation.kind is DeformationKind.BULGE
     name, of_od = (tr("Height"), tr("Height / OD")) if is_bulge else (tr("Depth"), tr("Depth / OD"))
     yield _measure(name, deformation.depth, deformation.depth_sd)

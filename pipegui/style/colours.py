@@ -11,6 +11,7 @@ ACCENT = "#7a4fd6"
 
 VERDICT = {
     Verdict.ACCEPT: "#009e73",
+    Verdict.ACCEPT_IF: "#56b4e9",
     Verdict.REVIEW: "#e69f00",
     Verdict.REJECT: "#d55e00",
     Verdict.NOT_MEASURABLE: "#8a8a8a",

@@ -67,6 +67,7 @@ ELEMENT_ICON = {
 VERDICT_ICON = {
     Verdict.REJECT: "close-octagon",
     Verdict.REVIEW: "alert",
+    Verdict.ACCEPT_IF: "check-circle-outline",
     Verdict.ACCEPT: "check-circle",
     Verdict.NOT_MEASURABLE: "help-circle",
 }

@@ -121,6 +121,14 @@ MENUS: dict[str, tuple[ActionSpec | None, ...]] = {
             "one_element idle",
         ),
         _A("size", "Nominal size…", "Set its catalogue size", "", "", "one_element"),
+        _A(
+            "answer",
+            "Answer…",
+            "Answer what the acceptance rules ask: on a weld, a whole joint, clad, …",
+            "",
+            "",
+            "one_element",
+        ),
         _SEPARATOR,
         _A(
             "go_up",

@@ -26,6 +26,7 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
         "rename",
         "kind",
         "size",
+        "answer",
         "split",
         "merge",
         "",
@@ -35,7 +36,7 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
     NodeKind.STATIONS: _OF_STATIONS,
     NodeKind.STATION: _OF_STATIONS,
     NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
-    NodeKind.DEFORMATION: ("zoom", "isolate", "", "accept", "reject", "reopen"),
+    NodeKind.DEFORMATION: ("zoom", "isolate", "", "answer", "", "accept", "reject", "reopen"),
 }
 """Names of actions by the kind of row; "" separates."""
 

@@ -18,8 +18,10 @@ from pipecore.settings import (
     LengthUnit,
     ProfileMethod,
     Settings,
+    SizeCatalogue,
     StackSettings,
     ThinningSettings,
+    choices_of,
     iterate_fields,
 )
 
@@ -38,6 +40,8 @@ def values_of(key: str) -> st.SearchStrategy[Any]:
     spec = FIELDS[key]
     if key == "stacks.directions":
         return st.lists(stack, max_size=3).map(tuple)
+    if choices := choices_of(spec.kind):
+        return st.lists(st.sampled_from(list(choices)), min_size=1, unique=True).map(tuple)
     if spec.kind is float:
         return st.floats(spec.minimum, spec.maximum, allow_nan=False, allow_infinity=False)
     if issubclass(spec.kind, StrEnum):
@@ -61,13 +65,24 @@ def test_that_settings_survive_a_toml_file(
 
 @given(any_settings)
 def test_that_settings_survive_the_text_of_flags(settings: Settings) -> None:
-    def text(value: object) -> str:
+    def text(key: str, value: Any) -> str:
+        if key == "elements.catalogue":
+            return ", ".join(value)
         if isinstance(value, tuple):
             return "; ".join(", ".join(map(repr, vector)) for vector in value)
         return str(value)
 
-    flags = {key: text(settings.get(key)) for key in FIELDS}
+    flags = {key: text(key, settings.get(key)) for key in FIELDS}
     assert Settings().replace(flags) == settings
+
+
+def test_that_one_catalogue_of_an_older_file_is_read_and_several_keep_their_order() -> None:
+    one = Settings.from_dict({"elements": {"catalogue": "EN 10220"}})
+    assert one.elements.catalogue == (SizeCatalogue.EN_10220,)
+    two = Settings().replace({"elements.catalogue": "JIS G3452/G3454 ,EN 10220,EN 10220"})
+    assert two.elements.catalogue == (SizeCatalogue.JIS_G3454, SizeCatalogue.EN_10220)
+    with pytest.raises(SettingsError, match="one or several of: ASME"):
+        Settings().replace({"elements.catalogue": ""})
 
 
 def test_that_what_a_file_leaves_out_keeps_its_default(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The command line: ``pipecore detect | simulate | info | convert``.
+"""The command line: ``pipecore detect | judge | simulate | info | convert``.
 
 Exit code 0: done; 1: the input or settings were wrong; 2: usage; 130: cancelled.
 """

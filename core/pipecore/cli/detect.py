@@ -18,7 +18,7 @@ from pipecore.errors import WriteError
 from pipecore.formatting import format_clock, format_measure
 from pipecore.pipeline import detect
 from pipecore.report import by_verdict, summarise, write_report
-from pipecore.rules import load_rule, outside_diameter
+from pipecore.rules import load_rules, outside_diameter, verdict_words
 from pipecore.settings import Settings
 from pipecore.tiling import GIB, detect_in_tiles, estimate_need
 from pipecore.types import PointCloud, Result
@@ -29,8 +29,8 @@ def run(args: argparse.Namespace, console: Console) -> None:
     settings = Settings.from_toml(args.settings) if args.settings else Settings()
     settings = settings.replace(given_settings(args))
     # What would fail at the end fails now.
-    load_rule(settings.deformation.rule)
-    _check_output(args.output, args.overwrite)
+    load_rules(settings.deformation.rule)
+    check_output(args.output, args.overwrite)
     if args.threads:
         parallel.set_threads(args.threads)
     if not is_compiled():
@@ -82,7 +82,8 @@ def _detected(
     yield cloud, detect(cloud, settings, console)
 
 
-def _check_output(directory: Path, overwrite: bool) -> None:
+def check_output(directory: Path, overwrite: bool) -> None:
+    """Raise `WriteError` if a report cannot be written into a folder: now, not at the end."""
     if directory.exists() and not directory.is_dir():
         raise WriteError(f"“{directory}” is a file; give a folder.")
     if not directory.absolute().parent.is_dir():
@@ -96,6 +97,7 @@ def deformation_lines(result: Result) -> list[str]:
     rows = [("#", "kind", "element", "chainage", "clock", "depth (mm)", "% OD", "verdict")]
     for d in by_verdict(result):
         element = result.element(d.element_id)
+        pct_od = 100 * d.depth / outside_diameter(element, d.chainage)
         rows.append(
             (
                 str(d.deformation_id),
@@ -104,8 +106,8 @@ def deformation_lines(result: Result) -> list[str]:
                 f"{d.chainage:.2f} m",
                 format_clock(d.clock),
                 format_measure(1000 * d.depth, 1000 * d.depth_sd),
-                f"{100 * d.depth / outside_diameter(element):.1f}" if np.isfinite(d.depth) else "",
-                d.verdict,
+                f"{pct_od:.1f}" if np.isfinite(pct_od) else "",
+                verdict_words(d),
             )
         )
     if len(rows) == 1:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import pipecore
-from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipecore.settings import JUDGING_KEYS, FieldSpec, Settings, choices_of, iterate_fields
 
 READING = "input.length_unit", "input.flagged_points", "input.stations", "input.columns"
 """Settings of every command that reads scans."""
@@ -39,6 +39,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.set_defaults(shows_stages=True)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _add_detect(commands)
+    _add_judge(commands)
     _add_simulate(commands)
     _add_info(commands)
     _add_convert(commands)
@@ -81,6 +82,35 @@ def _add_detect(commands: Any) -> None:
         "--threads", type=_count, metavar="N", help="processor threads to use (default: all)"
     )
     _add_settings(parser)
+
+
+def _add_judge(commands: Any) -> None:
+    parser = commands.add_parser(
+        "judge",
+        help="judge what was found anew: by another rule, with other sizes, with answers",
+        description="Judge the deformations of a report or a project anew, without a detection, "
+        "and write the report again. Settings that are not given stay as they were.",
+        allow_abbrev=False,
+    )
+    parser.add_argument(
+        "report", type=Path, metavar="DIR", help="folder of a report, or a project (.pipegui)"
+    )
+    parser.add_argument(
+        "-o", "--output", required=True, type=Path, metavar="DIR", help="folder of the new report"
+    )
+    parser.add_argument("--scan", metavar="NAME", help="which scan of a project")
+    parser.add_argument(
+        "--answers",
+        type=Path,
+        metavar="FILE",
+        help="answers to what the rules ask, as CSV or TOML: of a deformation_id or an element_id, "
+        "yes or no by question",
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace a report that is already there"
+    )
+    parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    _add_settings(parser, JUDGING_KEYS)
 
 
 def _add_simulate(commands: Any) -> None:
@@ -186,6 +216,8 @@ def _help(spec: FieldSpec) -> str:
     notes = []
     if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
         notes.append("one of " + ", ".join(spec.kind))
+    if several := choices_of(spec.kind):
+        notes.append("of " + ", ".join(several))
     if spec.minimum is not None and spec.maximum is not None:
         notes.append(f"{spec.minimum:g} to {spec.maximum:g}{unit}")
     elif spec.minimum is not None:
@@ -197,7 +229,8 @@ def _help(spec: FieldSpec) -> str:
     if isinstance(spec.default, float):
         notes.append(f"default {round(spec.default, 3):g}")
     elif spec.default:
-        notes.append(f"default {spec.default}")
+        default = spec.default if isinstance(spec.default, str) else ", ".join(spec.default)
+        notes.append(f"default {default}")
     text = f"{spec.help} ({'; '.join(notes)})" if notes else spec.help
     return text.replace("%", "%%")
 

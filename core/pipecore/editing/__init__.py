@@ -15,14 +15,18 @@ from pipecore.editing.changes import (
     name_run,
     set_nominal_size,
 )
+from pipecore.editing.judging import answer_for_deformation, answer_for_element, judge_again
 from pipecore.editing.redetection import detect_again, points_around, points_in_box
 from pipecore.editing.reshaping import STAGES, change_kind, merge_elements, split_element
 
 __all__ = [
     "STAGES",
+    "answer_for_deformation",
+    "answer_for_element",
     "change_kind",
     "delete_elements",
     "detect_again",
+    "judge_again",
     "kinds_of",
     "merge_elements",
     "name_element",

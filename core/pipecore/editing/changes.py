@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipecore.deformation import relate_deformations
-from pipecore.errors import EditError
+from pipecore.errors import EditError, SettingsError
 from pipecore.geometry import LineAxis
-from pipecore.rules import judge, load_rule
+from pipecore.rules import judge_all
 from pipecore.settings import Settings
 from pipecore.types import NO_ID, Element, ElementKind, NominalSize, Result
 
@@ -123,14 +123,13 @@ def set_nominal_size(result: Result, element_id: int, size: NominalSize | None) 
         If the acceptance rule is no longer there.
     """
     element = find(result, element_id)
-    sized = replace(element, nominal=size)
-    rule = load_rule(result.settings_of(element_id).deformation.rule)
-    deformations = tuple(
-        replace(d, verdict=judge(d, sized, rule)) if d.element_id == element_id else d
-        for d in result.deformations
+    sized = replace(
+        element, nominal=size, is_nominal_confirmed=size is not None, other_nominal=None
     )
-    changed = replace(with_element(result, sized), deformations=deformations)
-    return noted(changed, f"{element.label} is {size.name if size else 'of no nominal size'}")
+    return noted(
+        with_element(result, sized),
+        f"{element.label} is {size.name if size else 'of no nominal size'}",
+    )
 
 
 def kinds_of(element: Element) -> tuple[ElementKind, ...]:
@@ -184,15 +183,27 @@ class Labels(tuple[Element, ...]):
 
 
 def noted(result: Result, what: str) -> Result:
-    """Record a change and relate the deformations to what is around them now."""
+    """Record a change, relate the deformations to what is around them now, and judge them."""
     alone = [replace(d, **NOT_RELATED) for d in result.deformations]
     runs = {e.run_id for e in result.elements}
+    related = replace(result, deformations=relate_deformations(alone, result.elements))
+    try:
+        related = judged(related)
+    except SettingsError:
+        # A person's own rule may be gone since: what it said stands, what is new needs it.
+        if not all(d.rule for d in related.deformations):
+            raise
     return replace(
-        result,
+        related,
         run_names={i: name for i, name in result.run_names.items() if i in runs},
-        deformations=relate_deformations(alone, result.elements),
         edits=(*result.edits, what) if what else result.edits,
     )
+
+
+def judged(result: Result) -> Result:
+    """Judge all deformations anew, by the rules of the settings as they are."""
+    found = judge_all(result.deformations, result.elements, result.settings_of)
+    return replace(result, deformations=found)
 
 
 def with_element(result: Result, element: Element) -> Result:

@@ -16,7 +16,6 @@ from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import ArcAxis, Array
 from pipecore.measurement import MeasuringOptions, measure_elements
 from pipecore.progress import Progress, Renamed
-from pipecore.rules import judge, load_rule
 from pipecore.settings import ThinningSettings
 from pipecore.surface import sample_surface
 from pipecore.types import (
@@ -135,7 +134,6 @@ def measure_anew(
     progress : Progress
     """
     settings = result.settings_of(elements[0].element_id)
-    rule = load_rule(settings.deformation.rule)
     rest = without(result, gone)
     index = points_near(cloud, elements)
     part = part_of(cloud, index)
@@ -151,8 +149,7 @@ def measure_anew(
     first_id = max([d.deformation_id for d in result.deformations], default=0) + 1
     own = {e.element_id: e for e in measured.elements}
     deformations = tuple(
-        replace(d, deformation_id=i, rule=rule.name, verdict=judge(d, own[d.element_id], rule))
-        for i, d in enumerate(measured.deformations, start=first_id)
+        replace(d, deformation_id=i) for i, d in enumerate(measured.deformations, start=first_id)
     )
     of_stacks = result.profiles[
         np.isin(result.profiles.element_id, list(gone)) & (result.profiles.stack_id != OWN_STACK)

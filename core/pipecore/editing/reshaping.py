@@ -6,14 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipecore.catalogues import nominal_size
+from pipecore.catalogues import with_sizes
 from pipecore.editing.changes import Labels, find, kinds_of, noted, on_elements
 from pipecore.editing.refitting import RefittedElement, fit_shape, measure_anew, part_of
 from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII
 from pipecore.errors import EditError
 from pipecore.geometry import ArcAxis, Array, LineAxis
 from pipecore.progress import NoProgress, Progress
-from pipecore.settings import ElementSettings
 from pipecore.types import Element, ElementKind, PointCloud, Result
 
 STAGES = {"fitting": 0.2, "thinning": 0.15, "normals": 0.25, "deformations": 0.4}
@@ -86,7 +85,7 @@ def merge_elements(
     )
     gone = {p.element_id for p in parts}
     shape = _shape_on(cloud, result, merged, gone, progress)
-    merged = _sized(shape.element, result.settings_of(first.element_id).elements)
+    merged = with_sizes(shape.element, result.settings_of(first.element_id).elements)
     changed = measure_anew(cloud, result, gone, [merged], progress)
     runs = {p.run_id for p in parts}
     elements = (
@@ -163,7 +162,7 @@ def split_element(
         )
         piece_ = replace(piece, gaps=tuple((a, b) for a, b in gaps if b > a))
         shape = _shape_on(cloud, result, piece_, {element_id}, progress, must_fit=False)
-        parts.append(_sized(shape.element, result.settings_of(element_id).elements))
+        parts.append(with_sizes(shape.element, result.settings_of(element_id).elements))
     changed = measure_anew(cloud, result, {element_id}, parts, progress)
     return noted(changed, f"split {whole.label} at {chainage:.3f} m")
 
@@ -212,7 +211,7 @@ def change_kind(
             mean = 0.5 * (element.radius + element.radius_end)
             changed = replace(changed, radius=mean, radius_end=mean)
         changed = _shape_on(cloud, result, changed, {element_id}, progress).element
-    changed = _sized(changed, result.settings_of(element_id).elements)
+    changed = with_sizes(changed, result.settings_of(element_id).elements)
     anew = measure_anew(cloud, result, {element_id}, [changed], progress)
     return noted(anew, f"{element.label} is a {kind}")
 
@@ -237,14 +236,6 @@ def _shape_on(
             kind=element.kind,
         )
     return shape
-
-
-def _sized(element: Element, settings: ElementSettings) -> Element:
-    """The element with its catalogue size looked up, as a detection does."""
-    if element.kind not in (ElementKind.CYLINDER, ElementKind.TORUS):
-        return replace(element, nominal=None)
-    size = nominal_size(2 * element.radius, settings.catalogue, settings.size_tolerance_pct)
-    return replace(element, nominal=size)
 
 
 def _check_alike(parts: Sequence[Element]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.catalogues import nominal_size
+from pipecore.catalogues import with_sizes
 from pipecore.elements.fittings.flanges import pair_flanges
 from pipecore.elements.fittings.tees import ElementPart, Junction, cut_tees, find_junctions
 from pipecore.elements.proposals import Proposal
@@ -22,8 +22,6 @@ from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
 from pipecore.types import Element, ElementKind
 
-KINDS_WITH_NOMINAL_SIZE = (ElementKind.CYLINDER, ElementKind.TORUS, ElementKind.TEE)
-"""Kinds whose radius is a pipe's."""
 MIN_LENGTH_RADII = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
 MIN_PIPE_LENGTH_RADII = 6.0
@@ -179,9 +177,8 @@ def _element(
     found = part.found
     model = found.fit.model
     start_radius, end_radius = replace(found, axis=part.axis).radii
-    size = nominal_size(2 * start_radius, settings.catalogue, settings.size_tolerance_pct)
     shift = float(found.axis.pipe_coordinates(part.axis.start[None])[0][0])
-    return Element(
+    element = Element(
         element_id=element_id,
         run_id=run_id,
         kind=kind,
@@ -194,6 +191,6 @@ def _element(
         n_profiles=0,
         arc=found.extent.arc,
         rms=found.fit.sigma,
-        nominal=size if kind in KINDS_WITH_NOMINAL_SIZE else None,
         gaps=tuple((a - shift, b - shift) for a, b in found.extent.gaps),
     )
+    return with_sizes(element, settings)

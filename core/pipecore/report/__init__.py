@@ -8,6 +8,7 @@ Importing this package imports neither the plot library nor the LAZ writer.
 """
 
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -64,6 +65,7 @@ def write_report(
     result: Result,
     *,
     reviews: Mapping[int, Review] = NOT_REVIEWED,
+    segments: Path | None = None,
     overwrite: bool = False,
     progress: Progress | None = None,
 ) -> tuple[Note, ...]:
@@ -83,6 +85,8 @@ def write_report(
     result : Result
     reviews : mapping of int to Review
         What a person said of the deformations, by their ids.
+    segments : Path, optional
+        ``segments.laz`` of a former report with the same ids by point; it is copied.
     overwrite : bool
         Whether the folder may already hold files; those of a former report are replaced.
     progress : Progress, optional
@@ -119,7 +123,11 @@ def write_report(
         if cloud is None:
             return ()
         write_html(folder / "report.html", cloud, result, progress)
-        notes = write_segments(folder / "segments.laz", cloud, result, progress)
+        notes: tuple[Note, ...] = ()
+        if segments is not None:
+            shutil.copyfile(segments, folder / "segments.laz")
+        else:
+            notes = write_segments(folder / "segments.laz", cloud, result, progress)
         if result.settings.deformation.mesh_exaggeration > 0:
             write_deformation_mesh(folder / "deformations.ply", cloud, result)
         return notes

@@ -24,8 +24,15 @@ from pipecore.progress import NoProgress, Progress
 from pipecore.report.summary import VERDICT_ORDER, by_verdict, summarise
 from pipecore.report.world import FileCoordinates
 from pipecore.resources import resource
-from pipecore.rules import Rule, dent_limit, load_rule, outside_diameter, ovality_sd
-from pipecore.settings import FieldSpec, Settings, iterate_fields
+from pipecore.rules import (
+    Rule,
+    dent_limit,
+    load_rules,
+    outside_diameter,
+    ovality_sd,
+    verdict_words,
+)
+from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipecore.types import (
     Deformation,
     DeformationKind,
@@ -55,7 +62,7 @@ def render_html(cloud: PointCloud, result: Result, progress: Progress | None = N
     SettingsError
         If the settings' acceptance rule is no longer there.
     """
-    rule = load_rule(result.settings.deformation.rule)
+    rules = load_rules(result.settings.deformation.rule)
     place = FileCoordinates.of(result)
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(resource("report")),
@@ -66,15 +73,15 @@ def render_html(cloud: PointCloud, result: Result, progress: Progress | None = N
     return environment.get_template("report.html.j2").render(
         source=_source(result),
         summary=summarise(result),
-        facts=_facts(cloud, result, rule),
+        facts=_facts(cloud, result, rules),
         not_measurable=NOT_MEASURABLE,
         deformations=_deformation_table(result, place),
         figures=_figures(cloud, result, place, progress or NoProgress()),
-        blind_spot=_blind_spot(result, rule),
+        blind_spot=_blind_spot(result, rules),
         elements=_element_table(result),
         has_strain=any(np.isfinite(d.strain) for d in result.deformations),
         wall_thickness=f"{result.settings.deformation.wall_thickness_mm:g} mm",
-        rule=rule,
+        rules=rules,
         settings=settings,
         has_changes=any(s["is_changed"] for s in settings),
         made_by=f"PipeGUI {pipecore.__version__} · all tables beside this page as CSV",
@@ -85,7 +92,7 @@ def _source(result: Result) -> str:
     return result.source.name if result.source else "the scan"
 
 
-def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str]]:
+def _facts(cloud: PointCloud, result: Result, rules: Sequence[Rule]) -> list[tuple[str, str]]:
     unit = result.file_unit
     # An axis at a time: ten times as fast as all three along the rows.
     extent = [float(cloud.xyz[:, i].max()) - float(cloud.xyz[:, i].min()) for i in range(3)]
@@ -98,7 +105,7 @@ def _facts(cloud: PointCloud, result: Result, rule: Rule) -> list[tuple[str, str
         ),
         ("Extent", " × ".join(f"{d:.1f}" for d in extent) + " m"),
         ("Coordinates", f"{cloud.crs or 'reference system not known'}, in {unit}"),
-        ("Acceptance rule", f"{rule.title} ({rule.source})"),
+        ("Acceptance rule", "; ".join(f"{rule.title} ({rule.citation})" for rule in rules)),
     ]
     facts += [("Note on the file", str(note)) for note in result.notes]
     facts += [("Detected again", text) for text in _own_settings(result)]
@@ -146,7 +153,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
             str(d.deformation_id),
             element.label,
             d.kind,
-            d.verdict,
+            verdict_words(d),
             format_measure(1000 * d.depth, 1000 * d.depth_sd),
             _depth_pct_od(d, element),
             _ovality(d),
@@ -163,7 +170,7 @@ def _deformation_table(result: Result, place: FileCoordinates) -> dict[str, Any]
 
 def _remarks(d: Deformation, result: Result) -> list[str]:
     """How it lies to fittings and other dents, and why something could not be measured."""
-    remarks = []
+    remarks = [str(d.verdict_reason)] if d.verdict_reason else []
     if d.fitting_id == d.element_id:
         remarks.append("on a fitting")
     elif d.fitting_id:
@@ -181,7 +188,7 @@ def _remarks(d: Deformation, result: Result) -> list[str]:
 
 
 def _depth_pct_od(d: Deformation, element: Element) -> str:
-    per_od = 100 / outside_diameter(element)
+    per_od = 100 / outside_diameter(element, d.chainage)
     return format_measure(per_od * d.depth, per_od * d.depth_sd)
 
 
@@ -232,7 +239,7 @@ def _element_table(result: Result) -> dict[str, Any]:
                 e.label,
                 result.run_names.get(e.run_id, str(e.run_id)),
                 VERDICT_ORDER[rank] if rank < len(VERDICT_ORDER) else "",
-                e.nominal.name if e.nominal else "",
+                _sizes(e),
                 radius,
                 _bend(e),
                 format_measure(e.axis.length, decimals=2),
@@ -244,6 +251,18 @@ def _element_table(result: Result) -> dict[str, Any]:
             ]
         )
     return {"columns": columns, "rows": rows}
+
+
+def _sizes(element: Element) -> str:
+    """The nominal size, of a cone both, with the size that it may be besides."""
+    names = [n.name for n in (element.nominal, element.nominal_end) if n is not None]
+    text = " → ".join(names)
+    other = element.other_nominal
+    if other is not None:
+        text += (
+            f" ({'or ' if text else 'perhaps '}{other.name}: {1e3 * other.outside_diameter:g} mm)"
+        )
+    return text + (" clad" if element.is_clad else "")
 
 
 def _value_or_reason(element: Element, name: str, value: str) -> str:
@@ -279,6 +298,7 @@ def _figures(
                 "title": f"{d.kind.capitalize()} {d.deformation_id} on {element.label}",
                 "text": " · ".join(_where(d, place)),
                 "verdict": d.verdict,
+                "verdict_words": verdict_words(d),
                 "svg": Markup(draw_deformation(d, cloud, result, rows[d.element_id])),
             }
     progress.update("drawing figures", 1.0)
@@ -329,10 +349,10 @@ def _where(d: Deformation, place: FileCoordinates) -> list[str]:
     return [*parts, place.display(d.peak)]
 
 
-def _blind_spot(result: Result, rule: Rule) -> str:
+def _blind_spot(result: Result, rules: Sequence[Rule]) -> str:
     """Say where the rule asks for more than was looked for."""
     smallest = result.settings.deformation.min_depth_mm / 1000
-    limits = [(e, dent_limit(e, rule)) for e in result.elements]
+    limits = [(e, dent_limit(e, rules)) for e in result.elements]
     small = [e for e, limit in limits if limit is not None and limit.depth < smallest]
     if not small:
         return ""
@@ -352,6 +372,8 @@ def _setting_row(key: str, spec: FieldSpec, settings: Settings) -> dict[str, Any
     value = settings.get(key)
     if value == 0 and spec.zero_means:
         text = spec.zero_means
+    elif choices_of(spec.kind) is not None:
+        text = ", ".join(value)
     elif isinstance(value, tuple):
         text = "; ".join(",".join(f"{c:g}" for c in vector) for vector in value) or "none"
     else:

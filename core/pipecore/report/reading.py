@@ -156,7 +156,10 @@ def _unit(plain: Mapping[str, Any]) -> FileUnit:
 def _with_templates(plain: Mapping[str, Any], templates: Mapping[str, Any]) -> dict[str, Any]:
     """An element or a deformation whose reasons have their templates again."""
     reasons = plain.get("not_measurable", {})
-    return {**plain, "not_measurable": {k: templates.get(w, w) for k, w in reasons.items()}}
+    filled = {**plain, "not_measurable": {k: templates.get(w, w) for k, w in reasons.items()}}
+    if "verdict_reason" in plain:
+        filled["verdict_reason"] = templates.get(plain["verdict_reason"], plain["verdict_reason"])
+    return filled
 
 
 def _note(plain: Any) -> Note:

@@ -7,9 +7,9 @@ A kind of axis has its own keys: ``line`` has start, direction and length, ``arc
 centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
 length, with nine digits after the point. ``settings`` are those of the detection,
 ``own_settings`` those of elements that were detected again with others, by element id.
-``templates`` gives the sentences of ``notes`` and ``not_measurable`` that have values in
-them as template and values, so that they can be said in another language. A reader refuses
-a larger `format_version`; keys may be added within a version.
+``templates`` gives the sentences of ``notes``, ``not_measurable`` and ``verdict_reason``
+that have values in them as template and values, so that they can be said in another
+language. A reader refuses a larger `format_version`; keys may be added within a version.
 """
 
 import dataclasses
@@ -88,6 +88,7 @@ def _templates(result: Result) -> dict[str, Any]:
     """Templates and values of the sentences in a result, by the sentences."""
     found = (result.elements, result.deformations)
     reasons = [why for items in found for item in items for why in item.not_measurable.values()]
+    reasons += [d.verdict_reason for d in result.deformations]
     return {
         str(sentence): {"template": sentence.template, "values": _plain(sentence.values)}
         for sentence in [*result.notes, *reasons]
@@ -134,7 +135,7 @@ def _plain(value: Any) -> Any:
         plain_numbers[~np.isfinite(value)] = None
         return plain_numbers.tolist()
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):

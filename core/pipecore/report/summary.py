@@ -5,7 +5,13 @@ from collections import Counter
 from pipecore.formatting import format_count
 from pipecore.types import Deformation, ElementKind, Result, Verdict
 
-VERDICT_ORDER = (Verdict.REJECT, Verdict.REVIEW, Verdict.NOT_MEASURABLE, Verdict.ACCEPT)
+VERDICT_ORDER = (
+    Verdict.REJECT,
+    Verdict.REVIEW,
+    Verdict.NOT_MEASURABLE,
+    Verdict.ACCEPT_IF,
+    Verdict.ACCEPT,
+)
 
 
 def summarise(result: Result) -> str:

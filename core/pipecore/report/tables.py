@@ -24,7 +24,15 @@ from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.report.world import FileCoordinates
 from pipecore.rules import outside_diameter
 from pipecore.table import Table
-from pipecore.types import Array, ElementKind, PointCloud, Result, Review
+from pipecore.types import (
+    Answers,
+    Array,
+    ElementKind,
+    NominalSize,
+    PointCloud,
+    Result,
+    Review,
+)
 
 ROWS_AT_A_TIME = 5_000
 POINTS_AT_A_TIME = 1_000_000
@@ -69,7 +77,7 @@ def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
             _floats("radius_mm", [e.radius for e in elements], 1e3, 2),
             _floats("radius_sd_mm", [e.radius_sd for e in elements], 1e3, 3),
             _floats("radius_end_mm", cone_ends, 1e3, 2),
-            _texts("nominal_size", [n.name if n else "" for n in nominal]),
+            _texts("nominal_size", [_name(n) for n in nominal]),
             _floats("nominal_od_mm", nominal_ods, 1e3, 2),
             _floats("bend_radius_mm", [b.bend_radius if b else np.nan for b in bends], 1e3, 2),
             _angles("bend_angle_deg", [b.bend_angle if b else np.nan for b in bends]),
@@ -91,6 +99,11 @@ def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
             _texts("name", [e.name for e in elements]),
             _texts("run_name", run_names),
             _texts("stations", _stations(result, cloud)),
+            _texts("nominal_size_end", [_name(e.nominal_end) for e in elements]),
+            _texts("nominal_catalogue", [n.catalogue if n else "" for n in nominal]),
+            _texts("other_nominal_size", [_name(e.other_nominal) for e in elements]),
+            _texts("clad", ["yes" if e.is_clad else "" for e in elements]),
+            _texts("answers", [_answers(e.answers) for e in elements]),
         ]
     )
 
@@ -177,7 +190,9 @@ def deformations_table(result: Result, reviews: Mapping[int, Review] = NOT_REVIE
     """
     place = FileCoordinates.of(result)
     found = result.deformations
-    diameters = np.array([outside_diameter(result.element(d.element_id)) for d in found])
+    diameters = np.array(
+        [outside_diameter(result.element(d.element_id), d.chainage) for d in found]
+    )
     depths = np.array([d.depth for d in found])
     said = [reviews.get(d.deformation_id, Review()) for d in found]
     interacts = [("yes" if d.interacts else "no") if d.next_id else "" for d in found]
@@ -214,6 +229,10 @@ def deformations_table(result: Result, reviews: Mapping[int, Review] = NOT_REVIE
             _texts("not_measurable", [_reasons(d.not_measurable) for d in found]),
             _texts("review", [str(review.state) for review in said]),
             _texts("comment", [" ".join(review.comment.split()) for review in said]),
+            _texts("condition", [str(d.condition or "") for d in found]),
+            _texts("open_questions", ["+".join(d.open_questions) for d in found]),
+            _texts("verdict_reason", [str(d.verdict_reason) for d in found]),
+            _texts("answers", [_answers(d.answers) for d in found]),
         ]
     )
 
@@ -241,6 +260,14 @@ def _positions(name: str, local: ArrayLike, place: FileCoordinates) -> Iterator[
     points: Array = place.of_local(np.asarray(local, np.float64).reshape(-1, 3))
     for i, axis in enumerate("xyz"):
         yield _floats(f"{name}_{axis}", points[:, i], 1, place.decimals)
+
+
+def _name(size: NominalSize | None) -> str:
+    return size.name if size else ""
+
+
+def _answers(answers: Answers) -> str:
+    return "; ".join(f"{question}: {'yes' if yes else 'no'}" for question, yes in answers.items())
 
 
 def _reasons(reasons: Mapping[str, str]) -> str:

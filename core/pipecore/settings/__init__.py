@@ -16,7 +16,7 @@ import tomli_w
 
 from pipecore.display import Summarised
 from pipecore.errors import SettingsError
-from pipecore.settings.fields import FieldSpec, Group, convert, specs_of
+from pipecore.settings.fields import FieldSpec, Group, choices_of, convert, specs_of
 from pipecore.settings.groups import (
     DeformationSettings,
     DirectionPreset,
@@ -36,6 +36,7 @@ from pipecore.settings.groups import (
 )
 
 __all__ = [
+    "JUDGING_KEYS",
     "DeformationSettings",
     "DirectionPreset",
     "ElementSettings",
@@ -53,8 +54,18 @@ __all__ = [
     "StationSource",
     "ThinningSettings",
     "TilingSettings",
+    "choices_of",
     "iterate_fields",
 ]
+
+
+JUDGING_KEYS = (
+    "deformation.rule",
+    "deformation.wall_thickness_mm",
+    "elements.catalogue",
+    "elements.size_tolerance_pct",
+)
+"""Settings that change what is said of a result, and nothing that was measured."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -167,10 +178,12 @@ class Settings(Summarised):
         dict
         """
         result: dict[str, dict[str, Any]] = {}
-        for key, _ in iterate_fields():
+        for key, spec in iterate_fields():
             group, name = key.split(".")
             value = self.get(key)
-            if isinstance(value, tuple):
+            if choices_of(spec.kind) is not None:
+                value = ", ".join(value)
+            elif isinstance(value, tuple):
                 value = [list(v) for v in value]
             result.setdefault(group, {})[name] = str(value) if isinstance(value, StrEnum) else value
         return result

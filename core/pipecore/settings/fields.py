@@ -4,7 +4,7 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, ClassVar, get_type_hints
+from typing import Any, ClassVar, get_args, get_origin, get_type_hints
 
 from pipecore.errors import SettingsError
 
@@ -134,6 +134,25 @@ class Group:
             check(value, spec)
 
 
+def choices_of(kind: Any) -> type[StrEnum] | None:
+    """Return the choices of a setting that takes several of them, in an order.
+
+    Parameters
+    ----------
+    kind : type
+        Of the setting.
+
+    Returns
+    -------
+    type of StrEnum or None
+        None if the setting takes something else.
+    """
+    args = get_args(kind)
+    if get_origin(kind) is tuple and isinstance(args[0], type) and issubclass(args[0], StrEnum):
+        return args[0]
+    return None
+
+
 def specs_of(group: type[Group]) -> tuple[FieldSpec, ...]:
     """Return the specs of the fields of a group, in order."""
     kinds = get_type_hints(group)
@@ -154,6 +173,9 @@ def convert(value: Any, spec: FieldSpec) -> Any:
     try:
         if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
             return spec.kind(value)
+        if choices := choices_of(spec.kind):
+            names = value.split(",") if isinstance(value, str) else value
+            return tuple(dict.fromkeys(choices(name.strip()) for name in names))
         if spec.kind is float and not isinstance(value, bool):
             return float(value)
         if spec.kind is str and isinstance(value, str):
@@ -162,13 +184,21 @@ def convert(value: Any, spec: FieldSpec) -> Any:
             if isinstance(value, str):
                 value = [vector.split(",") for vector in value.split(";") if vector.strip()]
             return tuple(tuple(float(c) for c in vector) for vector in value)
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, AttributeError):
         pass
     raise _misfit(value, spec)
 
 
 def _misfit(value: object, spec: FieldSpec) -> SettingsError:
     key = spec.key
+    several = choices_of(spec.kind)
+    if several is not None:
+        return SettingsError(
+            "“{value}” does not fit the setting “{key}” (one or several of: {choices}).",
+            value=value,
+            key=key,
+            choices=", ".join(several),
+        )
     if isinstance(spec.kind, type) and issubclass(spec.kind, StrEnum):
         return SettingsError(
             "“{value}” does not fit the setting “{key}” (one of: {choices}).",
@@ -214,5 +244,8 @@ def check(value: Any, spec: FieldSpec) -> None:
                     "The stack {stack} is not a direction x, y, z with an optional width.",
                     stack=list(vector),
                 )
+    elif choices_of(spec.kind) is not None:
+        if not value:
+            raise _misfit("", spec)
     elif not isinstance(value, spec.kind):
         raise _misfit(value, spec)

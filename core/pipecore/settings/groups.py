@@ -69,6 +69,15 @@ class SizeCatalogue(StrEnum):
 
     ASME_B36_10 = "ASME B36.10"
     EN_10220 = "EN 10220"
+    EN_10220_SERIES_2 = "EN 10220 series 2"
+    EN_10220_SERIES_3 = "EN 10220 series 3"
+    EN_10255 = "EN 10255"
+    EN_1057 = "EN 1057"
+    EN_545 = "EN 545 (ductile iron)"
+    ISO_161 = "ISO 161 (plastics)"
+    JIS_G3454 = "JIS G3452/G3454"
+    DIN_2448 = "DIN 2448 (old)"
+    GOST_10704 = "GOST 8732/10704"
 
 
 @dataclass(frozen=True)
@@ -227,13 +236,16 @@ class ElementSettings(Group, name="elements"):
         unit="mm",
         minimum=0.0,
     )
-    catalogue: SizeCatalogue = setting(
-        SizeCatalogue.ASME_B36_10, "Size catalogue", "Where nominal sizes are looked up."
+    catalogue: tuple[SizeCatalogue, ...] = setting(
+        (SizeCatalogue.ASME_B36_10,),
+        "Size catalogues",
+        "Where nominal sizes are looked up; several are separated by commas, the first one goes "
+        "before the others.",
     )
     size_tolerance_pct: float = setting(
         2.0,
         "Size tolerance",
-        "A nominal size is given if the measured outside diameter is this close.",
+        "A nominal size is given if the measured outside diameter is surely this close.",
         unit="%",
         minimum=0.1,
         maximum=20.0,
@@ -266,7 +278,7 @@ class DeformationSettings(Group, name="deformation"):
     wall_thickness_mm: float = setting(
         0.0,
         "Wall thickness",
-        "Needed for the indicative dent strain.",
+        "Needed for the indicative dent strain and for limits by D/t.",
         unit="mm",
         minimum=0.0,
         zero_means="not known",
@@ -275,7 +287,7 @@ class DeformationSettings(Group, name="deformation"):
         "asme-6pct",
         "Acceptance rule",
         "The rule that judges each deformation: the name of one that comes with the program, "
-        "or the path of your own .toml file.",
+        "or the path of your own .toml file; several are separated by commas.",
     )
     mesh_exaggeration: float = setting(
         0.0,

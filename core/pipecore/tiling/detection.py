@@ -7,7 +7,7 @@ from pathlib import Path
 from pipecore.io import Corners
 from pipecore.pipeline import detect_in
 from pipecore.progress import NoProgress, Progress
-from pipecore.rules import load_rule
+from pipecore.rules import load_rules
 from pipecore.settings import Settings
 from pipecore.tiling import curves, slabs
 from pipecore.tiling.engine import start_engine
@@ -56,7 +56,7 @@ def detect_in_tiles(
     WriteError
         If the disk has no room for the temporary files.
     """
-    load_rule(settings.deformation.rule)  # what would fail at the end fails now
+    load_rules(settings.deformation.rule)  # what would fail at the end fails now
     beside = Path(settings.tiling.folder) if settings.tiling.folder else folder
     limit = int(settings.tiling.memory_gib * GIB) or int(MAX_SHARE_OF_FREE * free_memory())
     with (

@@ -13,10 +13,10 @@ from pipecore.types.deformation import (
     Review,
     ReviewState,
     SeenBy,
-    Verdict,
 )
 from pipecore.types.element import KIND_LABELS, Element, ElementKind, NominalSize
 from pipecore.types.ids import NO_ID
+from pipecore.types.judgement import Answers, Condition, Question, Verdict
 from pipecore.types.profiles import Profiles
 from pipecore.types.result import Result
 from pipecore.types.stack import OWN_STACK, Stack
@@ -25,7 +25,9 @@ __all__ = [
     "KIND_LABELS",
     "NO_ID",
     "OWN_STACK",
+    "Answers",
     "Array",
+    "Condition",
     "Deformation",
     "DeformationKind",
     "Element",
@@ -35,6 +37,7 @@ __all__ = [
     "NominalSize",
     "PointCloud",
     "Profiles",
+    "Question",
     "Reading",
     "Result",
     "Review",

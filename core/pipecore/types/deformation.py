@@ -11,6 +11,7 @@ from pipecore.formatting import format_clock, format_measure
 from pipecore.reasons import Reason
 from pipecore.types.arrays import Array
 from pipecore.types.ids import NO_ID
+from pipecore.types.judgement import Answers, Condition, Question, Verdict
 
 
 class DeformationKind(StrEnum):
@@ -44,15 +45,6 @@ class SeenBy(StrEnum):
     """Profiles that are missing inside the pipe (paper, figure 11)."""
 
 
-class Verdict(StrEnum):
-    """What the chosen rule says of a deformation; the values are those of the report."""
-
-    ACCEPT = "accept"
-    REVIEW = "review"
-    REJECT = "reject"
-    NOT_MEASURABLE = "not measurable"
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Deformation(Summarised):
     """A place where an element leaves its shape.
@@ -75,7 +67,7 @@ class Deformation(Summarised):
         As ratios; nan where they do not apply or cannot be measured.
     n_points : int
     rule : str
-        Name of the rule that gave the verdict.
+        Name of the rule that gave the verdict, or of those that did, joined by +.
     verdict : Verdict
     significance : float
         Depth in units of its own noise.
@@ -100,6 +92,14 @@ class Deformation(Summarised):
     not_measurable : mapping of str to Reason
         Why what is nan could not be measured, by the name of the field; what does not
         apply to the kind is not in it. Empty where all was measured.
+    condition : Condition, optional
+        How soon the rule asks for a repair, if it says so.
+    open_questions : mapping of Question to bool
+        Of `Verdict.ACCEPT_IF`: the answers that would make it an acceptance.
+    verdict_reason : Reason
+        Why a person has to look although the measures would be accepted, or "".
+    answers : mapping of Question to bool
+        What a person said of this place; it goes before what is said of its element.
     """
 
     deformation_id: int
@@ -131,6 +131,10 @@ class Deformation(Summarised):
     dmax: float = np.nan
     dmin: float = np.nan
     not_measurable: Mapping[str, Reason] = field(default_factory=dict)
+    condition: Condition | None = None
+    open_questions: Mapping[Question, bool] = field(default_factory=dict)
+    verdict_reason: Reason = Reason()
+    answers: Answers = field(default_factory=dict)
 
     def _title(self) -> str:
         return f"Deformation {self.deformation_id}"

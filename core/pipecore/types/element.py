@@ -11,6 +11,7 @@ from pipecore.formatting import format_measure
 from pipecore.geometry import ArcAxis, LineAxis
 from pipecore.reasons import Reason
 from pipecore.types.arrays import Array
+from pipecore.types.judgement import Answers, Question
 
 
 class ElementKind(StrEnum):
@@ -47,10 +48,13 @@ class NominalSize:
         Such as "DN 150 / NPS 6".
     outside_diameter : float
         Metres.
+    catalogue : str
+        The catalogue that it is from, or "".
     """
 
     name: str
     outside_diameter: float
+    catalogue: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,7 +85,7 @@ class Element(Summarised):
     straightness : float
         Largest distance of the measured axis from the chord of its ends, metres.
     nominal : NominalSize, optional
-        The catalogue size within tolerance, if any.
+        The catalogue size within tolerance, if any; of a cone that of its start.
     gaps : tuple of (float, float)
         Chainage ranges without profiles (paper, figure 11).
     not_measurable : mapping of str to Reason
@@ -89,6 +93,14 @@ class Element(Summarised):
         apply to the kind is not in it.
     name : str
         What the user calls it, or "".
+    nominal_end : NominalSize, optional
+        Of a cone: the catalogue size of its end.
+    other_nominal : NominalSize, optional
+        Another size that the measured diameter does not rule out, the nearest one.
+    is_nominal_confirmed : bool
+        Whether a person chose the size; then limits in percent refer to its diameter.
+    answers : mapping of Question to bool
+        What a person said of the whole element: whether it is clad, a whole joint, …
     """
 
     element_id: int
@@ -110,6 +122,15 @@ class Element(Summarised):
     gaps: tuple[tuple[float, float], ...] = ()
     not_measurable: Mapping[str, Reason] = field(default_factory=dict)
     name: str = ""
+    nominal_end: NominalSize | None = None
+    other_nominal: NominalSize | None = None
+    is_nominal_confirmed: bool = False
+    answers: Answers = field(default_factory=dict)
+
+    @property
+    def is_clad(self) -> bool:
+        """Whether a person said that what was scanned is cladding or insulation."""
+        return self.answers.get(Question.CLAD, False)
 
     @property
     def label(self) -> str:

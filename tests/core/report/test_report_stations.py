@@ -89,5 +89,5 @@ def test_that_the_stations_of_a_report_do_not_stop_it_from_being_loaded(tmp_path
     station = np.ones(2000, np.uint16)
     write_report(tmp_path / "report", replace(cloud, station=station), result)
     rows = (tmp_path / "report" / "elements.csv").read_text(encoding="utf-8").splitlines()
-    assert rows[0].endswith(",stations")
+    assert "stations" in rows[0].split(",")
     assert len(load(tmp_path / "report").elements) == len(rows) - 1
