@@ -24,8 +24,9 @@ def main(scan: str) -> None:
     for d in result.deformations:
         element = result.element(d.element_id)
         depth = f"{1000 * d.depth:.1f} ± {1000 * d.depth_sd:.1f} mm"
-        print(f"{d.kind} {d.deformation_id} on {element.label}: {depth}: {d.verdict}")
-        limit = pipecore.rules.dent_limit(element, rule)
+        verdict = pipecore.rules.verdict_words(d)
+        print(f"{d.kind} {d.deformation_id} on {element.label}: {depth}: {verdict}")
+        limit = pipecore.rules.dent_limit(element, [rule])
         if d.kind == pipecore.DeformationKind.DENT and limit is not None:
             print(f"    limit for dents there: {1000 * limit.depth:.1f} mm")
 

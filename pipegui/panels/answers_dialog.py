@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import (
     QButtonGroup,
     QDialog,
@@ -20,7 +21,7 @@ from pipegui.i18n.texts import tr
 from pipegui.style import theme
 
 Button = QDialogButtonBox.StandardButton
-CHOICES = ("Yes", True), ("No", False), ("Open", None)
+ANSWERS = True, False, None
 
 
 class AnswersDialog(QDialog):
@@ -60,7 +61,7 @@ class AnswersDialog(QDialog):
         grid = QGridLayout()
         grid.setHorizontalSpacing(2 * theme.SPACING)
         grid.setColumnStretch(0, 1)
-        texts = tr("Yes"), tr("No"), tr("Open")
+        texts = tr("Yes"), tr("No"), tr("Not known")
         for row, question in enumerate(questions):
             asked = tr(QUESTIONS[question].question)
             label = QLabel(asked)
@@ -68,15 +69,16 @@ class AnswersDialog(QDialog):
             label.setMinimumWidth(40 * theme.SPACING)
             grid.addWidget(label, row, 0)
             group = self.groups[question] = QButtonGroup(self)
-            for column, ((_, answer), text) in enumerate(zip(CHOICES, texts, strict=True)):
+            for column, (answer, text) in enumerate(zip(ANSWERS, texts, strict=True)):
                 button = QRadioButton(text)
                 button.setAccessibleName(f"{asked} {text}")
                 button.setChecked(answers.get(question) is answer)
                 group.addButton(button, column)
                 grid.addWidget(button, row, column + 1)
         buttons = QDialogButtonBox(Button.Ok | Button.Cancel)
-        buttons.button(Button.Ok).setText(tr("Judge"))
-        buttons.button(Button.Cancel).setText(tr("Cancel"))
+        for standard, text in ((Button.Ok, tr("Judge")), (Button.Cancel, tr("Cancel"))):
+            buttons.button(standard).setText(text)
+            buttons.button(standard).setIcon(QIcon())
         buttons.accepted.connect(self.accept)
         buttons.rejected.connect(self.reject)
         column_layout = QVBoxLayout(self)
@@ -87,7 +89,7 @@ class AnswersDialog(QDialog):
 
     def accept(self) -> None:
         """Close, and tell what was changed."""
-        given = {q: CHOICES[group.checkedId()][1] for q, group in self.groups.items()}
+        given = {q: ANSWERS[group.checkedId()] for q, group in self.groups.items()}
         changed = {q: answer for q, answer in given.items() if answer is not self._before.get(q)}
         super().accept()
         if changed:

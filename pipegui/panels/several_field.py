@@ -26,6 +26,7 @@ class SeveralField(QToolButton):
     def __init__(self, choices: Sequence[tuple[str, str]], file_filter: str = "") -> None:
         super().__init__()
         self._filter = file_filter
+        self.setProperty("several", True)
         self._text = ""
         self.values: tuple[str, ...] = ()
         self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
@@ -35,11 +36,11 @@ class SeveralField(QToolButton):
         menu = QMenu(self)
         self.setMenu(menu)
         self.ticks: dict[str, QAction] = {}
-        self._last: QAction | None = None
+        self.own_file: QAction | None = None
         if file_filter:
             menu.addSeparator()
-            self._last = menu.addAction(tr("Own file…"))
-            self._last.triggered.connect(self._ask_file)
+            self.own_file = menu.addAction(tr("Own file…"))
+            self.own_file.triggered.connect(self._ask_file)
         for text, value in choices:
             self._add(text, value)
 
@@ -47,10 +48,10 @@ class SeveralField(QToolButton):
         tick = QAction(text, self)
         tick.setCheckable(True)
         tick.toggled.connect(lambda is_on: self._toggle(value, is_on))
-        if self._last is None:
+        if self.own_file is None:
             self.menu().addAction(tick)
         else:
-            self.menu().insertAction(self._last, tick)
+            self.menu().insertAction(self.own_file, tick)
         self.ticks[value] = tick
 
     def show_values(self, values: Sequence[str]) -> None:

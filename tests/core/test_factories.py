@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipecore.rules import judge, load_rule
+from pipecore.rules import judge, load_rules
 from pipecore.types import NO_ID, OWN_STACK, ElementKind
 from tests.factories import NOISE, make_scan
 
@@ -51,7 +51,7 @@ def test_that_deformations_peak_on_the_deformed_surface(scan):
 def test_that_the_verdicts_are_those_of_the_rule(scan):
     _, result = scan
     for d in result.deformations:
-        assert judge(d, result.element(d.element_id), load_rule(d.rule)) is d.verdict
+        assert judge(d, result.element(d.element_id), load_rules(d.rule)).verdict is d.verdict
 
 
 def test_that_the_number_of_points_is_as_asked_and_the_scan_is_the_same_each_time():

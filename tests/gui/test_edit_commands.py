@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipecore.catalogues import sizes_of
-from pipecore.types import ReviewState
+from pipecore.errors import SettingsError
+from pipecore.types import Question, ReviewState
 from pipegui.model import commands, element_commands, selection_commands
 from pipegui.model.document import Document, Scan, Selection
 from pipegui.model.history import History
@@ -91,8 +92,38 @@ def test_that_what_changes_nothing_is_no_step():
     history.do(element_commands.rename_element, 2, "Pipe 2")
     history.do(element_commands.rename_scan, 0, "  ")
     history.do(element_commands.rename_run, 1, " Run 1")
-    history.do(element_commands.set_nominal_size, 2, RESULT.element(2).nominal)
     assert history.steps == []
+    # A person confirms a size once; the second time changes nothing.
+    for _ in range(2):
+        history.do(element_commands.set_nominal_size, 2, RESULT.element(2).nominal)
+    assert history.steps == ["Change size of Pipe 2"]
+
+
+def test_that_another_rule_judges_at_once_and_undo_takes_it_back():
+    history = History(START)
+    before = [d.verdict for d in START.result.deformations]
+    history.do(commands.change_settings, {"deformation.rule": "49cfr195-452h"})
+    judged = history.document.result
+    assert {d.rule for d in judged.deformations} == {"49cfr195-452h"}
+    assert judged.settings.deformation.rule == "49cfr195-452h"
+    history.do(commands.change_settings, {"stacks.width_mm": 12})
+    assert history.document.result is judged
+    history.undo()
+    history.undo()
+    assert [d.verdict for d in history.document.result.deformations] == before
+    with pytest.raises(SettingsError, match="no acceptance rule"):
+        history.do(commands.change_settings, {"deformation.rule": "of-nobody"})
+
+
+def test_that_answers_go_to_the_place_or_to_its_element():
+    history = History(START)
+    dent = START.result.deformations[0]
+    told = {Question.WELD: True, Question.CLAD: False}
+    history.do(element_commands.answer, dent.deformation_id, dent.element_id, told)
+    result = history.document.result
+    assert result.deformation(dent.deformation_id).answers == {Question.WELD: True}
+    assert result.element(dent.element_id).answers == {Question.CLAD: False}
+    assert history.steps == ["Answer"]
 
 
 def test_that_several_elements_are_a_selection_until_another_is_selected():
