@@ -1,4 +1,4 @@
-"""Axes in space: a straight line or a circular arc, with chainage and clock position.
+"""Axes in space: a line, a circular arc or a bowed curve, with chainage and clock position.
 
 Every element of a pipe run has an axis. An axis maps points in space to *pipe
 coordinates* (chainage, distance from the axis, clock angle) and back. See
@@ -11,9 +11,12 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
+N_NEWTON = 4
+"""Steps to the foot of a point on a bowed axis; see `pipecore._kernels.pipe_coordinates`."""
 VERTICAL_COS = np.cos(np.deg2rad(15.0))
 """An axis within 15 degrees of the vertical counts as vertical: its 12:00 is grid north."""
 
@@ -134,7 +137,7 @@ class Axis(Protocol):
 
     @property
     def numbers(self) -> Array:
-        """The axis as `pipecore._kernels.pipe_coordinates` takes it, shape (17,)."""
+        """The axis as `pipecore._kernels.pipe_coordinates` takes it, one-dimensional."""
         ...
 
     def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
@@ -156,6 +159,34 @@ class Axis(Protocol):
 
     def reversed(self) -> "Axis":
         """The same axis with chainage counted from its other end."""
+        ...
+
+    def part(self, low: float, high: float) -> "Axis":
+        """The axis between two chainages, which may lie beyond its ends.
+
+        Parameters
+        ----------
+        low, high : float
+            Metres.
+
+        Returns
+        -------
+        Axis
+        """
+        ...
+
+    def moved(self, shift: Array) -> "Axis":
+        """The axis moved by a vector.
+
+        Parameters
+        ----------
+        shift : ndarray
+            Metres, shape (3,).
+
+        Returns
+        -------
+        Axis
+        """
         ...
 
 
@@ -264,6 +295,14 @@ class LineAxis:
         LineAxis
         """
         return LineAxis(self.end, -self.direction, self.length)
+
+    def part(self, low: float, high: float) -> "LineAxis":
+        """The axis between two chainages."""
+        return LineAxis(self.at(low), self.direction, high - low)
+
+    def moved(self, shift: Array) -> "LineAxis":
+        """The axis moved by a vector."""
+        return LineAxis(self.start + shift, self.direction, self.length)
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,3 +418,216 @@ class ArcAxis:
             self.bend_radius,
             self.bend_angle,
         )
+
+    def part(self, low: float, high: float) -> "ArcAxis":
+        """The axis between two chainages."""
+        return ArcAxis(
+            self.centre,
+            self.normal,
+            self._outward(low),
+            self.bend_radius,
+            (high - low) / self.bend_radius,
+        )
+
+    def moved(self, shift: Array) -> "ArcAxis":
+        """The axis moved by a vector."""
+        return ArcAxis(
+            self.centre + shift,
+            self.normal,
+            self.towards_start,
+            self.bend_radius,
+            self.bend_angle,
+        )
+
+
+N_PIECES = 16
+"""Pieces of a bowed axis that is cut out of another."""
+
+
+@dataclass(frozen=True, eq=False)
+class CurveAxis:
+    """A bowed axis, as a sagging, bent or kinked pipe has it: offsets from the chord of its ends.
+
+    Cubic splines of the distance along the chord; beyond its ends it goes on straight.
+
+    Parameters
+    ----------
+    start, end : ndarray
+        Ends of the chord, which are those of the axis, shape (3,).
+    up, right : ndarray
+        Offsets to 12:00 and 3:00 of the chord at equal steps along it, metres, shape (n + 1,);
+        zero at both ends.
+    """
+
+    start: Array
+    end: Array
+    up: Array
+    right: Array
+
+    @classmethod
+    def through(cls, points: Array, n_pieces: int = N_PIECES) -> "CurveAxis":
+        """Return the axis through points that follow each other from end to end.
+
+        Parameters
+        ----------
+        points : ndarray
+            Local coordinates, shape (m, 3); they advance along the chord of the first and last.
+        n_pieces : int
+
+        Returns
+        -------
+        CurveAxis
+        """
+        chord = LineAxis.between(points[0], points[-1])
+        up, right = chord.frame(0.0)
+        offset = points - chord.start
+        along = offset @ chord.direction
+        knots = np.linspace(0.0, chord.length, n_pieces + 1)
+        across = CubicSpline(along, np.stack([offset @ up, offset @ right], axis=1))(knots)
+        across[[0, -1]] = 0.0
+        return cls(chord.start, chord.end, across[:, 0], across[:, 1])
+
+    @cached_property
+    def chord(self) -> LineAxis:
+        """The straight line from end to end."""
+        return LineAxis.between(self.start, self.end)
+
+    @property
+    def bow(self) -> float:
+        """Largest distance from the chord at the steps along it, metres."""
+        return float(np.hypot(self.up, self.right).max())
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        knots = np.linspace(0.0, self.chord.length, len(self.up))
+        return CubicSpline(knots, np.stack([self.up, self.right], axis=1), bc_type="not-a-knot")
+
+    @cached_property
+    def _chainage_at_knots(self) -> Array:
+        """Length of the curve up to each step, by Simpson's rule over each piece."""
+        knots = self._spline.x
+        middles = (knots[1:] + knots[:-1]) / 2
+        at_knots, at_middles = (
+            np.sqrt(1.0 + np.square(self._spline(t, 1)).sum(axis=1)) for t in (knots, middles)
+        )
+        pieces = np.diff(knots) * (at_knots[:-1] + 4 * at_middles + at_knots[1:]) / 6
+        return np.concatenate([[0.0], np.cumsum(pieces)])
+
+    @property
+    def length(self) -> float:
+        """Length along the curve."""
+        return float(self._chainage_at_knots[-1])
+
+    def _along_chord(self, chainage: ArrayLike) -> Array:
+        """Distance along the chord at `chainage`, the latter even within each piece."""
+        s, at_knots = np.asarray(chainage, np.float64), self._chainage_at_knots
+        k = np.clip(np.searchsorted(at_knots, s, side="right") - 1, 0, len(at_knots) - 2)
+        size = self.chord.length / (len(at_knots) - 1)
+        return np.asarray(k * size + (s - at_knots[k]) * size / np.diff(at_knots)[k])
+
+    def _offsets(self, t: Array, derivative: int = 0) -> Array:
+        """Offsets from the chord or their derivatives, shape (…, 2)."""
+        inside = np.clip(t, 0.0, self.chord.length)
+        beyond = (t - inside)[..., None]
+        values = self._spline(inside, derivative)
+        if derivative == 0:
+            return np.asarray(values + beyond * self._spline(inside, 1))
+        return np.asarray(np.where(beyond != 0.0, 0.0, values) if derivative > 1 else values)
+
+    def _place(self, t: Array) -> Array:
+        up, right = self.chord.frame(t)
+        across = self._offsets(t)
+        return self.chord.at(t) + across[..., :1] * up + across[..., 1:] * right
+
+    def at(self, chainage: ArrayLike) -> Array:
+        """Points on the axis at `chainage`."""
+        return self._place(self._along_chord(chainage))
+
+    def _tangent_at(self, t: Array) -> Array:
+        up, right = self.chord.frame(t)
+        slope = self._offsets(t, 1)
+        ahead = self.chord.direction + slope[..., :1] * up + slope[..., 1:] * right
+        return np.asarray(ahead / np.linalg.norm(ahead, axis=-1, keepdims=True))
+
+    def _frame_at(self, t: Array) -> tuple[Array, Array]:
+        """12:00 of the chord made perpendicular to the tangent, and 3:00."""
+        tangent = self._tangent_at(t)
+        up, _ = self.chord.frame(t)
+        across = up - (up * tangent).sum(axis=-1, keepdims=True) * tangent
+        across = across / np.linalg.norm(across, axis=-1, keepdims=True)
+        return across, np.cross(tangent, across)
+
+    def tangent(self, chainage: ArrayLike) -> Array:
+        """Unit tangents at `chainage`."""
+        return self._tangent_at(self._along_chord(chainage))
+
+    def frame(self, chainage: ArrayLike) -> tuple[Array, Array]:
+        """Unit vectors to 12:00 and 3:00 at `chainage`."""
+        return self._frame_at(self._along_chord(chainage))
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The axis as the kernels take it."""
+        up, right = self.chord.frame(0.0)
+        n, at_knots = len(self.up) - 1, self._chainage_at_knots
+        shape = [-float(n), self.chord.length, 0.0, 0.0, self.length]
+        size = self.chord.length / n
+        # The highest power comes first in SciPy, last here.
+        cubic = self._spline.c[::-1]
+        pieces = np.concatenate(
+            [
+                cubic[:, :, 0].T,
+                cubic[:, :, 1].T,
+                at_knots[:-1, None],
+                np.diff(at_knots)[:, None] / size,
+            ],
+            axis=1,
+        )
+        line = [self.start, self.chord.direction, up, right, shape]
+        return np.concatenate([*line, pieces.ravel()])
+
+    def pipe_coordinates(self, points: Array) -> tuple[Array, Array, Array]:
+        """Chainage, distance and clock angle of `points` (n, 3)."""
+        xyz = np.asarray(points, dtype=np.float64)
+        chord = self.chord
+        up, right = chord.frame(0.0)
+        offset = xyz - chord.start
+        along, across = offset @ chord.direction, np.stack([offset @ up, offset @ right], axis=-1)
+        t = along
+        for _ in range(N_NEWTON):
+            left, slope = across - self._offsets(t), self._offsets(t, 1)
+            bent = 1.0 + (slope * slope - left * self._offsets(t, 2)).sum(axis=-1)
+            t = t + (along - t + (left * slope).sum(axis=-1)) / np.maximum(bent, 0.2)
+        off = xyz - self._place(t)
+        up_here, right_here = self._frame_at(t)
+        at_knots, size = self._chainage_at_knots, chord.length / (len(self.up) - 1)
+        k = np.clip(np.floor(t / size).astype(np.intp), 0, len(self.up) - 2)
+        chainage = at_knots[k] + (t - k * size) * np.diff(at_knots)[k] / size
+        return (
+            chainage,
+            *_polar((off * up_here).sum(axis=-1), (off * right_here).sum(axis=-1)),
+        )
+
+    def reversed(self) -> "CurveAxis":
+        """The same axis from its other end.
+
+        Returns
+        -------
+        CurveAxis
+        """
+        # From there 12:00 is the same, and 3:00 is on the other side.
+        return CurveAxis(self.end, self.start, self.up[::-1], -self.right[::-1])
+
+    def part(self, low: float, high: float) -> "CurveAxis":
+        """The axis between two chainages."""
+        share = (high - low) / self.length
+        n_pieces = max(4, round(share * (len(self.up) - 1)))
+        return CurveAxis.through(self.at(np.linspace(low, high, 8 * n_pieces + 1)), n_pieces)
+
+    def moved(self, shift: Array) -> "CurveAxis":
+        """The axis moved by a vector."""
+        return CurveAxis(self.start + shift, self.end + shift, self.up, self.right)
+
+
+AnyAxis = LineAxis | ArcAxis | CurveAxis
+"""What an element's axis may be."""

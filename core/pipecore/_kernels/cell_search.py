@@ -72,13 +72,16 @@ def appended(items, n, item):
 
 @njit(cache=True, nogil=True)
 def distance_from_axis(axis, x, y, z):
-    """Return the distance of a point from an unbounded line or a full circle, metres.
+    """Return the distance of a point from an unbounded line, a full circle or a curve, metres.
 
     Parameters
     ----------
     axis (17,) : see `pipe_coordinates`
     x, y, z : metres
     """
+    if axis[12] < 0.0:
+        _, up, right = across_axis(axis, x, y, z)
+        return math.sqrt(up * up + right * right)
     px, py, pz = x - axis[0], y - axis[1], z - axis[2]
     along = px * axis[3] + py * axis[4] + pz * axis[5]
     across = math.sqrt(max(px * px + py * py + pz * pz - along * along, 0.0))

@@ -4,7 +4,13 @@ import math
 
 from numba import njit
 
-from pipecore._kernels.pipe_coordinates import across_axis, polar
+from pipecore._kernels.pipe_coordinates import (
+    across_axis,
+    along_chord,
+    frame_of_curve,
+    offsets_of_curve,
+    polar,
+)
 
 
 @njit(cache=True, nogil=True)
@@ -29,6 +35,13 @@ def facing(axis, slope, x, y, z, nx, ny, nz):
         across += ny * (axis[7] * up + axis[10] * right)
         across += nz * (axis[8] * up + axis[11] * right)
         ahead = nx * axis[3] + ny * axis[4] + nz * axis[5]
+    elif bend < 0.0:
+        _, _, du, dv, _, _ = offsets_of_curve(axis, along_chord(axis, chainage))
+        tx, ty, tz, ux, uy, uz, rx, ry, rz = frame_of_curve(axis, du, dv)
+        across = nx * (ux * up + rx * right)
+        across += ny * (uy * up + ry * right)
+        across += nz * (uz * up + rz * right)
+        ahead = nx * tx + ny * ty + nz * tz
     else:
         # Out of the arc's centre, along its normal, and ahead.
         cos, sin = math.cos(chainage / bend), math.sin(chainage / bend)
