@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import ArcAxis, CurveAxis, LineAxis
 from pipecore.types import NO_ID, OWN_STACK, Element, Result
 
 
@@ -54,6 +54,10 @@ def _check_ids(what: str, ids: list[int]) -> None:
         raise ValueError(f"its {what} are not in the order of their numbers")
 
 
+LEAST_STEPS = 4
+"""A curve with fewer steps is no cubic spline."""
+
+
 def _check_vectors(*vectors: np.ndarray) -> None:
     for vector in vectors:
         if vector.shape != (3,) or not np.isfinite(vector).all():
@@ -67,6 +71,11 @@ def _check_element(element: Element) -> None:
             _check_vectors(axis.start, axis.direction)
         case ArcAxis():
             _check_vectors(axis.centre, axis.normal, axis.towards_start)
+        case CurveAxis():
+            _check_vectors(axis.start, axis.end)
+            is_even = len(axis.up) == len(axis.right) >= LEAST_STEPS
+            if not is_even or not np.isfinite([axis.up, axis.right]).all():
+                raise ValueError(f"the curve of element {element.element_id} is none")
     numbers = (axis.length, element.radius, element.radius_end)
     if not all(np.isfinite(n) and n > 0 for n in numbers) or element.run_id <= NO_ID:
         raise ValueError(f"element {element.element_id} has no length, radius or run")

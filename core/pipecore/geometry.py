@@ -631,3 +631,24 @@ class CurveAxis:
 
 AnyAxis = LineAxis | ArcAxis | CurveAxis
 """What an element's axis may be."""
+
+
+def offsets_from_chord(axis: AnyAxis, chainage: Array) -> Array:
+    """Return how far an axis lies off the chord of its ends, to 12:00 and 3:00 of the chord.
+
+    Parameters
+    ----------
+    axis : AnyAxis
+    chainage : ndarray
+        Metres, shape (n,).
+
+    Returns
+    -------
+    ndarray
+        Metres, shape (n, 2); zero for a straight axis, and for a bend, which is to be one.
+    """
+    if not isinstance(axis, CurveAxis):
+        return np.zeros((len(chainage), 2))
+    up, right = axis.chord.frame(0.0)
+    offset = axis.at(chainage) - axis.start
+    return np.stack([offset @ up, offset @ right], axis=1)

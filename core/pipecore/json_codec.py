@@ -17,12 +17,12 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from pipecore.errors import SettingsError
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import ArcAxis, CurveAxis, LineAxis
 from pipecore.reasons import Reason
 from pipecore.settings import Settings
 
 KIND_KEY = "kind"
-KIND_NAMES: dict[type, str] = {LineAxis: "line", ArcAxis: "arc"}
+KIND_NAMES: dict[type, str] = {LineAxis: "line", ArcAxis: "arc", CurveAxis: "curve"}
 """How files name the dataclasses that stand where several are possible."""
 VERSION_1_NAMES = {"LineAxis": "line", "ArcAxis": "arc"}
 """How files of version 1 name them under "type"."""

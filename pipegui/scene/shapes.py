@@ -3,7 +3,7 @@
 import numpy as np
 import pyvista as pv
 
-from pipecore.geometry import ArcAxis, Array, surface_points
+from pipecore.geometry import Array, LineAxis, surface_points
 from pipecore.types import Element, ElementKind, Profiles
 
 N_AROUND = 48
@@ -69,7 +69,7 @@ def outline(elements: tuple[Element, ...]) -> Array:
 
 
 def _chainages(element: Element) -> Array:
-    n_along = N_ALONG_BEND if isinstance(element.axis, ArcAxis) else 2
+    n_along = 2 if isinstance(element.axis, LineAxis) else N_ALONG_BEND
     return np.linspace(0, element.axis.length, n_along)
 
 

@@ -34,7 +34,7 @@ def offsets_of_curve(axis, t):
     """
     n = int(-axis[12])
     size = axis[13] / n
-    k = min(max(int(math.floor(t / size)), 0), n - 1)
+    k = min(max(math.floor(t / size), 0), n - 1)
     x = t - k * size
     c = FIRST + PER_PIECE * k
     low = min(max(x, 0.0), size)
@@ -63,7 +63,7 @@ def along_chord(axis, chainage):
     """
     n = int(-axis[12])
     size = axis[13] / n
-    k = min(max(int(math.floor(chainage / axis[16] * n)), 0), n - 1)
+    k = min(max(math.floor(chainage / axis[16] * n), 0), n - 1)
     while k > 0 and chainage < axis[FIRST + PER_PIECE * k + 8]:
         k -= 1
     while k < n - 1 and chainage >= axis[FIRST + PER_PIECE * (k + 1) + 8]:
@@ -108,7 +108,7 @@ def across_curve(axis, along, a, b):
         t += (along - t + (a - u) * du + (b - v) * dv) / max(slope, 0.2)
     n = int(-axis[12])
     size = axis[13] / n
-    k = min(max(int(math.floor(t / size)), 0), n - 1)
+    k = min(max(math.floor(t / size), 0), n - 1)
     c = FIRST + PER_PIECE * k
     chainage = axis[c + 8] + (t - k * size) * axis[c + 9]
     u, v, du, dv, _, _ = offsets_of_curve(axis, t)

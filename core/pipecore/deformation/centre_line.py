@@ -7,7 +7,7 @@ import numpy as np
 from pipecore.deformation.contour import Contour, inner_rows
 from pipecore.deformation.deviation_map import Grid
 from pipecore.deformation.free_sections import FreeSections
-from pipecore.geometry import Array
+from pipecore.geometry import AnyAxis, Array, CurveAxis, offsets_from_chord
 
 KINK_ADVANTAGE = 20.0
 """How much lower the χ² of two straight pieces must be than that of smooth bows."""
@@ -48,7 +48,7 @@ class CentreLine:
     explained: float
 
 
-def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
+def measure_centre_line(contour: Contour, sections: FreeSections, axis: AnyAxis) -> CentreLine:
     """Measure how far the line of centres leaves the chord of its ends.
 
     Parameters
@@ -57,6 +57,8 @@ def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
         Fitted with a constant radius.
     sections : FreeSections
         Of the same surface, dents left out: the contour would round a kink's corner.
+    axis : AnyAxis
+        That the surface is about: what a curved one has of the bow belongs to it.
 
     Returns
     -------
@@ -64,8 +66,12 @@ def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
     """
     inner = inner_rows(contour.grid)
     s = contour.grid.chainages[inner]
-    offset = contour.terms[inner, 1:3]
-    deviation = offset - _chord(s, offset)
+    of_axis = offsets_from_chord(axis, contour.grid.chainages)
+    offset = contour.terms[inner, 1:3] + of_axis[inner]
+    # The ends of a curved axis are known; those of the contour's rows lie a little within.
+    ends = np.array([0.0, axis.length]) if isinstance(axis, CurveAxis) else s[[0, -1]]
+    at_ends = contour.terms[inner, 1:3][[0, -1]] + offsets_from_chord(axis, ends)
+    deviation = offset - _chord(s, ends, at_ends)
     distance = np.hypot(deviation[:, 0], deviation[:, 1])
     peak = int(np.argmax(distance))
     side = deviation[peak] / max(distance[peak], 1e-12)
@@ -75,7 +81,7 @@ def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
     variance = [max(float(side @ covariance[i] @ side), LEAST_SD**2) for i in (peak, 0, -1)]
     sd = np.sqrt(variance[0] + (1 - share) ** 2 * variance[1] + share**2 * variance[2])
     clock = float(np.mod(np.arctan2(side[1], side[0]), 2 * np.pi))
-    shape = _shape_of(*_binned(contour, sections, side), contour.grid)
+    shape = _shape_of(*_binned(contour, sections, side, of_axis), contour.grid)
     if shape.kink is not None:
         knee, sag, sag_sd = shape.kink
         return CentreLine(sag, max(sag_sd, float(sd)), knee, clock, True, shape.explained)
@@ -84,9 +90,10 @@ def measure_centre_line(contour: Contour, sections: FreeSections) -> CentreLine:
     )
 
 
-def _chord(s: Array, offset: Array) -> Array:
-    share = ((s - s[0]) / (s[-1] - s[0]))[:, None]
-    return np.asarray(offset[0] * (1 - share) + offset[-1] * share)
+def _chord(s: Array, ends: Array, at_ends: Array) -> Array:
+    """The line between the ends, at chainages `s`."""
+    share = ((s - ends[0]) / (ends[1] - ends[0]))[:, None]
+    return np.asarray(at_ends[0] * (1 - share) + at_ends[1] * share)
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,9 @@ class _Shape:
     kink: tuple[float, float, float] | None
 
 
-def _binned(contour: Contour, sections: FreeSections, side: Array) -> tuple[Array, Array, Array]:
+def _binned(
+    contour: Contour, sections: FreeSections, side: Array, of_axis: Array
+) -> tuple[Array, Array, Array]:
     """Chainages, and centres of pooled profiles to one side with their standard deviations."""
     inner = np.flatnonzero(inner_rows(contour.grid))
     size = max(1, -(-len(inner) // MAX_BINS)) // 2 * 2 + 1
@@ -106,7 +115,7 @@ def _binned(contour: Contour, sections: FreeSections, side: Array) -> tuple[Arra
     middles = middles[np.isfinite(centre[middles, 0])]
     variance = np.einsum("k,rkl,l->r", side, covariance[middles], side)
     sd = np.sqrt(np.maximum(variance, LEAST_SD**2))
-    return contour.grid.chainages[middles], centre[middles] @ side, sd
+    return contour.grid.chainages[middles], (centre + of_axis)[middles] @ side, sd
 
 
 def _shape_of(s: Array, lateral: Array, sd: Array, grid: Grid) -> _Shape:

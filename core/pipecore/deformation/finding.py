@@ -46,7 +46,7 @@ from pipecore.deformation.records import (
     describe_patch,
 )
 from pipecore.deformation.unrolled_points import UnrolledPoints, surface_distance, unroll
-from pipecore.geometry import Array, LineAxis, surface_points
+from pipecore.geometry import ArcAxis, Array, surface_points
 from pipecore.reasons import Reason
 from pipecore.settings import DeformationSettings
 from pipecore.types import Deformation, DeformationKind, Element, ElementKind
@@ -185,7 +185,7 @@ def find_deformations(
         for o in stretches
     ]
     straightness, why_not_straight = np.nan, NO_REASON
-    if isinstance(element.axis, LineAxis) and element.kind in SEARCHED:
+    if not isinstance(element.axis, ArcAxis) and element.kind in SEARCHED:
         straightness, why_not_straight, bow = _measure_bow(
             element, surface, heights, patches, n_terms=n_terms, settings=settings
         )
@@ -276,7 +276,7 @@ def _applicable(element: Element) -> tuple[str, ...]:
     """What is measured of an element as a whole, if the scan carries it."""
     if element.kind not in SEARCHED:
         return ()
-    return ("ovality", "straightness") if isinstance(element.axis, LineAxis) else ("ovality",)
+    return ("ovality",) if isinstance(element.axis, ArcAxis) else ("ovality", "straightness")
 
 
 def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, Reason]:
@@ -361,7 +361,7 @@ def _measure_bow(
         constant_radius=True,
     )
     undented = replace(heights, in_contact=heights.in_contact | ~used)
-    line = measure_centre_line(contour, FreeSections.of(undented))
+    line = measure_centre_line(contour, FreeSections.of(undented), element.axis)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
     if line.straightness_sd > settings.min_depth_mm / 1000:
         why = Reason(

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
-from pipecore.geometry import Array, LineAxis
+from pipecore.geometry import ArcAxis, Array
 from pipecore.types import Deformation, DeformationKind, Element, ElementKind
 
 FITTINGS = (ElementKind.FLANGE, ElementKind.TORUS, ElementKind.CONE, ElementKind.TEE)
@@ -181,9 +181,10 @@ def _gap(
 
 
 def _on_one_line(a: Element, b: Element) -> bool:
-    if not (isinstance(a.axis, LineAxis) and isinstance(b.axis, LineAxis)):
+    if isinstance(a.axis, ArcAxis) or isinstance(b.axis, ArcAxis):
         return False
-    return bool(abs(a.axis.direction @ b.axis.direction) > PARALLEL_COS)
+    one, other = (e.axis.tangent(e.axis.length / 2) for e in (a, b))
+    return bool(abs(one @ other) > PARALLEL_COS)
 
 
 def _reach(d: Deformation, along: float, around: float) -> float:

@@ -13,7 +13,7 @@ from pipecore.elements.refinement.guess import axis_through
 from pipecore.elements.refinement.sampled_fits import fit_measured
 from pipecore.elements.refinement.surface_fits import ArcSurface, LineSurface
 from pipecore.ellipses import radius_sd_factor
-from pipecore.geometry import ArcAxis, Array
+from pipecore.geometry import ArcAxis, Array, CurveAxis
 from pipecore.measurement import MeasuringOptions, measure_elements
 from pipecore.progress import Progress, Renamed
 from pipecore.settings import ThinningSettings
@@ -105,11 +105,12 @@ def _model_of(element: Element) -> LineSurface | ArcSurface:
     axis = element.axis
     if isinstance(axis, ArcAxis):
         return ArcSurface(axis.centre, axis.normal, axis.bend_radius, element.radius)
+    line = axis.chord if isinstance(axis, CurveAxis) else axis
     is_tapered = element.kind is ElementKind.CONE
     slope = (element.radius_end - element.radius) / axis.length if is_tapered else 0.0
-    half = axis.length / 2
+    half = line.length / 2
     return LineSurface(
-        axis.at(half), axis.direction, element.radius + slope * half, slope, is_tapered
+        line.at(half), line.direction, element.radius + slope * half, slope, is_tapered
     )
 
 

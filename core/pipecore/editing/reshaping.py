@@ -11,7 +11,7 @@ from pipecore.editing.changes import Labels, find, kinds_of, noted, on_elements
 from pipecore.editing.refitting import RefittedElement, fit_shape, measure_anew, part_of
 from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII
 from pipecore.errors import EditError
-from pipecore.geometry import ArcAxis, Array, LineAxis
+from pipecore.geometry import AnyAxis, Array, LineAxis
 from pipecore.progress import NoProgress, Progress
 from pipecore.types import Element, ElementKind, PointCloud, Result
 
@@ -145,11 +145,11 @@ def split_element(
     new_id = max(e.element_id for e in result.elements) + 1
     middle_radius = float(whole.radius_at(chainage))
     pieces = [
-        replace(whole, axis=_cut(whole.axis, 0.0, chainage), radius_end=middle_radius),
+        replace(whole, axis=whole.axis.part(0.0, chainage), radius_end=middle_radius),
         replace(
             whole,
             element_id=new_id,
-            axis=_cut(whole.axis, chainage, length),
+            axis=whole.axis.part(chainage, length),
             radius=middle_radius,
             name="",
         ),
@@ -261,7 +261,7 @@ def _check_alike(parts: Sequence[Element]) -> None:
             )
 
 
-def _common_axis(parts: Sequence[Element]) -> LineAxis | ArcAxis:
+def _common_axis(parts: Sequence[Element]) -> AnyAxis:
     """The line or arc on which all parts lie, from the first end to the last."""
     longest = max(parts, key=lambda p: p.axis.length)
     samples = np.concatenate([p.axis.at(np.linspace(0, p.axis.length, 20)) for p in parts])
@@ -287,27 +287,17 @@ def _common_axis(parts: Sequence[Element]) -> LineAxis | ArcAxis:
                 element=part,
                 off=1000 * off,
             )
-    return _cut(axis, float(chainage.min()), float(chainage.max()))
+    return axis.part(float(chainage.min()), float(chainage.max()))
 
 
-def _cut(axis: LineAxis | ArcAxis, low: float, high: float) -> LineAxis | ArcAxis:
-    """The part of an axis between two chainages, which may lie beyond its ends."""
-    if isinstance(axis, LineAxis):
-        return LineAxis(axis.at(low), axis.direction, high - low)
-    towards = (axis.at(low) - axis.centre) / axis.bend_radius
-    return ArcAxis(
-        axis.centre, axis.normal, towards, axis.bend_radius, (high - low) / axis.bend_radius
-    )
-
-
-def _span_on(axis: LineAxis | ArcAxis, part: Element) -> tuple[float, float]:
+def _span_on(axis: AnyAxis, part: Element) -> tuple[float, float]:
     """Chainages of a part's ends on another axis, the lower first."""
     ends = np.stack([part.axis.start, part.axis.end])
     low, high = np.sort(axis.pipe_coordinates(ends)[0]).tolist()
     return low, high
 
 
-def _gaps_on(axis: LineAxis | ArcAxis, parts: Sequence[Element]) -> list[tuple[float, float]]:
+def _gaps_on(axis: AnyAxis, parts: Sequence[Element]) -> list[tuple[float, float]]:
     """The parts' own gaps, as chainages of another axis."""
     found = []
     for part in parts:
@@ -317,7 +307,7 @@ def _gaps_on(axis: LineAxis | ArcAxis, parts: Sequence[Element]) -> list[tuple[f
     return found
 
 
-def _taper(axis: LineAxis | ArcAxis, parts: Sequence[Element]) -> tuple[float, float]:
+def _taper(axis: AnyAxis, parts: Sequence[Element]) -> tuple[float, float]:
     """Radii at both ends of a line through the radii at the parts' ends."""
     chainage: list[Array] = []
     radius: list[Array] = []

@@ -17,7 +17,7 @@ from pipecore.elements.runs.joining import join_straights
 from pipecore.elements.runs.numbering import number_runs
 from pipecore.elements.runs.trimming import trim_to_each_other, trim_to_fitting
 from pipecore.elements.selection import select_elements
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
 from pipecore.types import Element, ElementKind
@@ -62,7 +62,7 @@ def build_elements(
         From `progress`.
     """
     fitted, links = select_elements(proposals, nearby, settings, progress)
-    fitted, links = join_straights(fitted, links)
+    fitted, links = join_straights(fitted, links, nearby)
     axes, met = _trim_axes(fitted, links)
     kinds = [_kind(f) for f in fitted]
     for flange, pipe in pair_flanges(fitted):
@@ -82,13 +82,11 @@ def build_elements(
     )
 
 
-def _spans(axes: list[LineAxis | ArcAxis], fitted: list[FittedElement]) -> list[AxisSpan]:
+def _spans(axes: list[AnyAxis], fitted: list[FittedElement]) -> list[AxisSpan]:
     return [AxisSpan(axis, f.radii) for axis, f in zip(axes, fitted, strict=True)]
 
 
-def _trim_axes(
-    fitted: list[FittedElement], links: list[Link]
-) -> tuple[list[LineAxis | ArcAxis], set[End]]:
+def _trim_axes(fitted: list[FittedElement], links: list[Link]) -> tuple[list[AnyAxis], set[End]]:
     """Axes that end where the next element begins; also the ends that another follows.
 
     Adds the pairs of elements that follow each other to `links`.

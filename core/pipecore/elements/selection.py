@@ -16,6 +16,7 @@ from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import refine_proposal
 from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface
 from pipecore.elements.runs.ends import End, Link
+from pipecore.elements.runs.joining import bowed_pipes
 from pipecore.elements.speculative_refinement import refine_speculatively
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
@@ -54,6 +55,7 @@ def select_elements(
         straights, progress, (0.31, 0.65), min_lengths=MIN_STRAIGHT_RADII
     )
     progress.update("elements", 0.65)
+    selector.join_bowed()
     for corner, bend_radius, ends in find_corners(
         list(selector.fitted), nearby, progress, (0.65, 0.67)
     ):
@@ -157,6 +159,20 @@ class Selector:
         if usable is not None:
             found = fit_bend(corner, bend_radius, self._nearby, usable)
             self._accept_if_valid(found, between)
+
+    def join_bowed(self) -> None:
+        """Put one pipe about a curved axis in the place of straights that are pieces of it.
+
+        Before fittings are looked for: beside a piece, what leaves its line looks like a ring.
+        """
+        bowed = bowed_pipes(self.fitted, self._nearby, self.is_free)
+        for group, pipe in bowed:
+            for i in group:
+                self.is_free[self.fitted[i].inliers] = True
+            self.is_free[pipe.inliers] = False
+        pieces = {i for group, _ in bowed for i in group}
+        straights = [f for i, f in enumerate(self.fitted) if i not in pieces]
+        self.fitted = [pipe for _, pipe in bowed] + straights
 
     def try_reducers(self) -> None:
         """Fit reducers between straights on one line and accept those that are valid.

@@ -19,6 +19,7 @@ from pipecore.ellipses import (
     line_rss,
     radius_sd_factor,
 )
+from pipecore.geometry import offsets_from_chord
 from pipecore.settings import EllipseFit
 from pipecore.types import OWN_STACK, Element, Profiles
 
@@ -97,6 +98,7 @@ def cut_normal_stack(
 
     at = np.asarray((rows + 0.5) * width, np.float64)
     up, right = axis.frame(at)
+    off_axis = np.stack([circles.centre_x, circles.centre_y], axis=1)
     # A sphere has no radius at its poles.
     nominal = np.maximum(element.radius_at(at), 1e-9)
     table = Profiles(
@@ -113,7 +115,7 @@ def cut_normal_stack(
         radius=radius,
         radius_sd=rms * radius_sd_factor(arc) / np.sqrt(n_points),
         ovality=np.where(is_free, (semi_major - semi_minor) / nominal, np.nan),
-        centre_deviation=np.hypot(circles.centre_x, circles.centre_y),
+        centre_deviation=np.hypot(*(off_axis + offsets_from_chord(axis, at)).T),
         radius_deviation=radius - nominal,
         arc=arc,
         n_points=n_points.astype(np.int32),

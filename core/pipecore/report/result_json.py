@@ -4,7 +4,9 @@ Format version 1. Lengths are metres and angles radians; positions are local
 coordinates in metres, and world coordinates in the file's unit are
 ``(local + origin) / metres_per_unit``. ``null`` stands for what could not be measured.
 A kind of axis has its own keys: ``line`` has start, direction and length, ``arc`` has
-centre, normal, towards_start, bend_radius and bend_angle. Profiles are columns of equal
+centre, normal, towards_start, bend_radius and bend_angle,
+``curve`` has start and end of its chord, and at equal steps along it offsets to 12:00 (up) and
+3:00 (right). Profiles are columns of equal
 length, with nine digits after the point. ``settings`` are those of the detection,
 ``own_settings`` those of elements that were detected again with others, by element id.
 ``templates`` gives the sentences of ``notes``, ``not_measurable`` and ``verdict_reason``

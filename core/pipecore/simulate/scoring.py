@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.geometry import ArcAxis, Array, LineAxis
+from pipecore.geometry import ArcAxis, Array
 from pipecore.simulate import TrueDeformation, TrueElement, Truth
 from pipecore.simulate.scoring_deformations import WHOLE_AXIS, DeformationMatch, match_deformations
 from pipecore.types import Deformation, Element, ElementKind, Result
@@ -318,12 +318,7 @@ def _check(claimed: Element, truths: list[_TrueAxis], reported: list[Element]) -
 
 
 def _moved(element: Element, shift: Array) -> Element:
-    axis = element.axis
-    if isinstance(axis, LineAxis):
-        moved: LineAxis | ArcAxis = replace(axis, start=axis.start + shift)
-    else:
-        moved = replace(axis, centre=axis.centre + shift)
-    return replace(element, axis=moved, centre=element.centre + shift)
+    return replace(element, axis=element.axis.moved(shift), centre=element.centre + shift)
 
 
 def _samples(element: Element | TrueElement) -> tuple[Array, float]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipecore.display import Summarised
 from pipecore.formatting import format_measure
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis
 from pipecore.reasons import Reason
 from pipecore.types.arrays import Array
 from pipecore.types.judgement import Answers, Question
@@ -106,7 +106,7 @@ class Element(Summarised):
     element_id: int
     run_id: int
     kind: ElementKind
-    axis: LineAxis | ArcAxis
+    axis: AnyAxis
     radius: float
     radius_sd: float
     radius_end: float

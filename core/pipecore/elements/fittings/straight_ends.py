@@ -49,9 +49,9 @@ def straight_ends(fitted: list[FittedElement], first: int = 0) -> list[StraightE
     ends = []
     for i, f in enumerate(fitted[first:], start=first):
         if isinstance(f.fit.model, LineSurface) and not f.fit.model.is_tapered:
-            direction, radius = f.fit.model.direction, f.fit.model.radius
-            ends.append(StraightEnd((i, 0), f.axis.start, -direction, radius))
-            ends.append(StraightEnd((i, 1), f.axis.end, direction, radius))
+            radius, axis = f.fit.model.radius, f.axis
+            ends.append(StraightEnd((i, 0), axis.start, -axis.tangent(0.0), radius))
+            ends.append(StraightEnd((i, 1), axis.end, axis.tangent(axis.length), radius))
     return ends
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.runs.ends import AxisSpan, LineIndex
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis, LineAxis
 
 MIN_BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
 """A branch leaves its run at this angle or more."""
@@ -127,14 +127,14 @@ class ElementPart:
     """An element, or a stretch of one that tees have cut: `whole` is the element's number."""
 
     found: FittedElement
-    axis: LineAxis | ArcAxis
+    axis: AnyAxis
     whole: int
     is_tee: bool = False
 
 
 def cut_tees(
     fitted: list[FittedElement],
-    axes: list[LineAxis | ArcAxis],
+    axes: list[AnyAxis],
     tees: list[Junction],
     xyz: NDArray[np.float64],
 ) -> list[ElementPart]:

@@ -14,7 +14,7 @@ from pipecore.elements.refinement.surface_fits import (
     SurfaceFit,
 )
 from pipecore.ellipses import radius_sd_factor
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis
 
 Indices = NDArray[np.intp]
 
@@ -37,7 +37,7 @@ class FittedElement:
     """
 
     fit: SurfaceFit[LineSurface] | SurfaceFit[ArcSurface] | SurfaceFit[SphereSurface]
-    axis: LineAxis | ArcAxis
+    axis: AnyAxis
     inliers: Indices
     extent: Extent
     misfit: float

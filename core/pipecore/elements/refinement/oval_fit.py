@@ -16,7 +16,7 @@ from pipecore.elements.refinement.section_model import (
     fit_section_model,
 )
 from pipecore.elements.refinement.surface_fits import SurfaceFit
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis
 from pipecore.robust import robust_sd
 
 Array = NDArray[np.float64]
@@ -57,9 +57,7 @@ def fit_oval(
     return replace(guess.after(fit, 0.0, guess.axis.length), section=section), fit
 
 
-def section_remover(
-    axis: LineAxis | ArcAxis, section: SectionModel | None
-) -> Callable[[Array], Array] | None:
+def section_remover(axis: AnyAxis, section: SectionModel | None) -> Callable[[Array], Array] | None:
     """Return a function that subtracts a section's heights from points; None without a section."""
     if section is None:
         return None

@@ -31,7 +31,7 @@ from pipecore.elements.refinement.sampled_fits import (
     points_off_bands,
 )
 from pipecore.elements.refinement.surface_fits import SphereSurface, SurfaceFit
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis, ArcAxis
 
 Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
@@ -199,7 +199,7 @@ def _refine_finally(
     return _placed(with_fit(fit), last.axis)
 
 
-def _placed(fitted: FittedElement, axis: LineAxis | ArcAxis) -> FittedElement:
+def _placed(fitted: FittedElement, axis: AnyAxis) -> FittedElement:
     """The element with the axis of its last fit, its extent counted from the axis's start."""
     old = fitted.extent
     gaps = tuple((a - old.low, b - old.low) for a, b in old.gaps)
@@ -214,7 +214,7 @@ def _placed(fitted: FittedElement, axis: LineAxis | ArcAxis) -> FittedElement:
     )
 
 
-def _margin(axis: LineAxis | ArcAxis, radius: float, round_: int) -> float:
+def _margin(axis: AnyAxis, radius: float, round_: int) -> float:
     """How far beyond its ends an axis may grow in this round."""
     if isinstance(axis, ArcAxis):
         opening = (2 * np.pi - axis.bend_angle) * axis.bend_radius

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis, CurveAxis, LineAxis
 
 Array = NDArray[np.float64]
 End = tuple[int, int]
@@ -28,19 +28,26 @@ COLLINEAR_GAP = 12.0
 class AxisSpan:
     """What matters of an element for its neighbours: its axis and the radii at both ends."""
 
-    axis: LineAxis | ArcAxis
+    axis: AnyAxis
     radii: tuple[float, float]
 
 
-class LineIndex:
-    """Straight axes, to find those near a place among many."""
+def _line_of(axis: AnyAxis) -> LineAxis | None:
+    """A straight axis, or the chord of a bowed one."""
+    if isinstance(axis, CurveAxis):
+        return axis.chord
+    return axis if isinstance(axis, LineAxis) else None
 
-    def __init__(self, axes: Sequence[LineAxis | ArcAxis]) -> None:
-        self._which = np.array([i for i, a in enumerate(axes) if isinstance(a, LineAxis)], np.intp)
-        lines = [a for a in axes if isinstance(a, LineAxis)]
-        self._start = np.array([a.start for a in lines]).reshape(-1, 3)
-        self._direction = np.array([a.direction for a in lines]).reshape(-1, 3)
-        self._length = np.array([a.length for a in lines])
+
+class LineIndex:
+    """Straight axes and chords of bowed ones, to find those near a place among many."""
+
+    def __init__(self, axes: Sequence[AnyAxis]) -> None:
+        lines = {i: line for i, a in enumerate(axes) if (line := _line_of(a)) is not None}
+        self._which = np.array(list(lines), np.intp)
+        self._start = np.array([a.start for a in lines.values()]).reshape(-1, 3)
+        self._direction = np.array([a.direction for a in lines.values()]).reshape(-1, 3)
+        self._length = np.array([a.length for a in lines.values()])
 
     def near(self, place: Array, reach: Array) -> list[int]:
         """Numbers of the axes that pass a place within `reach` (metres, one of each axis)."""

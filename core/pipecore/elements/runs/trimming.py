@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipecore.geometry import ArcAxis, LineAxis
+from pipecore.geometry import AnyAxis, ArcAxis, CurveAxis, LineAxis
 
 MIN_BEND_ANGLE = float(np.deg2rad(5.0))
 """A bend is never trimmed to less than this angle."""
@@ -12,9 +12,7 @@ REACH_RADII = 2.0
 """Ends move by at most this many radii to a tangent point."""
 
 
-def trim_to_fitting(
-    straight: LineAxis | ArcAxis, fitting: LineAxis | ArcAxis
-) -> tuple[LineAxis | ArcAxis, LineAxis | ArcAxis]:
+def trim_to_fitting(straight: AnyAxis, fitting: AnyAxis) -> tuple[AnyAxis, AnyAxis]:
     """Trim a straight and the fitting at its nearer end to where they meet.
 
     Parameters
@@ -28,8 +26,15 @@ def trim_to_fitting(
     -------
     straight, fitting : LineAxis or ArcAxis
     """
-    if not isinstance(straight, LineAxis):
+    if isinstance(fitting, CurveAxis) or isinstance(straight, ArcAxis):
         return straight, fitting
+    if isinstance(straight, CurveAxis):
+        middle = fitting.at(fitting.length / 2)
+        end = int(np.linalg.norm(straight.end - middle) < np.linalg.norm(straight.start - middle))
+        line = _end_line(straight, end)
+        trimmed, fitting = trim_to_fitting(line, fitting)
+        assert isinstance(trimmed, LineAxis)
+        return _as_far_as(straight, line, trimmed), fitting
     if isinstance(fitting, LineAxis):
         return trim_to_reducer(straight, fitting), fitting
     middle = fitting.at(fitting.length / 2)
@@ -40,8 +45,8 @@ def trim_to_fitting(
 
 
 def trim_to_each_other(
-    a: LineAxis | ArcAxis, end_a: int, b: LineAxis | ArcAxis, end_b: int, radius: float
-) -> tuple[LineAxis | ArcAxis, LineAxis | ArcAxis]:
+    a: AnyAxis, end_a: int, b: AnyAxis, end_b: int, radius: float
+) -> tuple[AnyAxis, AnyAxis]:
     """Trim a straight and a bend whose ends meet to their tangent point.
 
     Parameters
@@ -57,12 +62,35 @@ def trim_to_each_other(
     -------
     a, b : LineAxis or ArcAxis
     """
-    if isinstance(a, LineAxis) and isinstance(b, ArcAxis):
-        return trim_to_tangent(a, end_a, b, end_b, REACH_RADII * radius)
-    if isinstance(a, ArcAxis) and isinstance(b, LineAxis):
-        line, arc = trim_to_tangent(b, end_b, a, end_a, REACH_RADII * radius)
-        return arc, line
-    return a, b
+    if isinstance(a, ArcAxis) and not isinstance(b, ArcAxis):
+        straight, bend = trim_to_each_other(b, end_b, a, end_a, radius)
+        return bend, straight
+    if not isinstance(b, ArcAxis) or isinstance(a, ArcAxis):
+        return a, b
+    line = _end_line(a, end_a)
+    trimmed, arc = trim_to_tangent(line, end_a, b, end_b, REACH_RADII * radius)
+    return _as_far_as(a, line, trimmed), arc
+
+
+def _end_line(axis: LineAxis | CurveAxis, end: int) -> LineAxis:
+    """The straight line in which an axis ends, with the chainages of the axis."""
+    if isinstance(axis, LineAxis):
+        return axis
+    tangent = axis.tangent(axis.length if end else 0.0)
+    start = axis.end - axis.length * tangent if end else axis.start
+    return LineAxis(start, tangent, axis.length)
+
+
+def _as_far_as(
+    axis: LineAxis | CurveAxis, line: LineAxis, trimmed: LineAxis
+) -> LineAxis | CurveAxis:
+    """The axis between the chainages to which the line in which it ends was trimmed."""
+    if trimmed is line:
+        return axis
+    if isinstance(axis, LineAxis):
+        return trimmed
+    low = float((trimmed.start - line.start) @ line.direction)
+    return axis.part(low, low + trimmed.length)
 
 
 def trim_to_tangent(
