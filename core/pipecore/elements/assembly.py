@@ -62,7 +62,7 @@ def build_elements(
         From `progress`.
     """
     fitted, links = select_elements(proposals, nearby, settings, progress)
-    fitted, links = join_straights(fitted, links, nearby)
+    fitted, links = join_straights(fitted, links)
     axes, met = _trim_axes(fitted, links)
     kinds = [_kind(f) for f in fitted]
     for flange, pipe in pair_flanges(fitted):

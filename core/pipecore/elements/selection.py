@@ -16,7 +16,7 @@ from pipecore.elements.refinement.nearby_points import NearbyPoints
 from pipecore.elements.refinement.refine import refine_proposal
 from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface
 from pipecore.elements.runs.ends import End, Link
-from pipecore.elements.runs.joining import bowed_pipes
+from pipecore.elements.runs.joining import join_bowed
 from pipecore.elements.speculative_refinement import refine_speculatively
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
@@ -165,14 +165,7 @@ class Selector:
 
         Before fittings are looked for: beside a piece, what leaves its line looks like a ring.
         """
-        bowed = bowed_pipes(self.fitted, self._nearby, self.is_free)
-        for group, pipe in bowed:
-            for i in group:
-                self.is_free[self.fitted[i].inliers] = True
-            self.is_free[pipe.inliers] = False
-        pieces = {i for group, _ in bowed for i in group}
-        straights = [f for i, f in enumerate(self.fitted) if i not in pieces]
-        self.fitted = [pipe for _, pipe in bowed] + straights
+        self.fitted = join_bowed(self.fitted, self._nearby, self.is_free)
 
     def try_reducers(self) -> None:
         """Fit reducers between straights on one line and accept those that are valid.

@@ -38,6 +38,11 @@ HELD_RADII = 0.25
 STIFFNESS_RADII, OVAL_RADII = 0.3, 0.04
 """How much neighbouring offsets of an axis differ from a line's, and the size of ovality, where
 no point says so; radii, as standard deviations."""
+TURN_RADII, MAX_TURN_COS = 3.0, float(np.cos(np.deg2rad(10.0)))
+"""A pipe turns by no more within this length, in radii: tighter ones are bends (of 17 radii)."""
+BEYOND_RADII, MIN_ARC_BEYOND, MIN_POINTS_BEYOND = (0.8, 1.6), 0.6, 12
+"""A pipe goes on where between these distances beyond its end, in radii, points lie around this
+share of its arc."""
 TUKEY_SDS = 4.685
 FIT_POINTS, ROUND_POINTS = 60_000, 12_000
 MIN_POINTS = 60
@@ -77,24 +82,82 @@ def fit_curved_pipe(
     axis = _first_axis([p.axis for p in parts], radius)
     sigma = max(MIN_SIGMA_M, *(p.fit.sigma for p in parts))
     band = max(FIRST_BAND_RADII * radius, band_of(sigma))
-    extent: Extent | None = None
+    before, grows = axis, [True, True]
     for _ in range(N_ROUNDS):
         near = _points_about(axis, radius, nearby, is_free, MARGIN_RADII * radius, band)
         inside = (near.chainage > 0.0) & (near.chainage < axis.length)
         moved = _moved(axis, radius, near, inside, sigma)
         if moved is None:
             return None
-        axis, radius, sigma = moved
+        corner = _sharpest(moved[0], radius)
+        if corner is not None:
+            # A bend begins there: that end goes back to where it was, and stays.
+            end = int(corner > moved[0].length / 2)
+            if not grows[end]:
+                return None
+            grows[end], axis = False, before
+            continue
+        before = axis = moved[0]
+        radius, sigma = moved[1:]
         band = band_of(sigma)
         near = _points_about(axis, radius, nearby, is_free, MARGIN_RADII * radius, band)
         extent = _extent(axis, radius, near, nearby, sigma)
         if extent is None:
             return None
-        grown = max(abs(extent.low), abs(extent.high - axis.length))
-        axis = _between(axis, extent.low, extent.high, radius)
+        low = extent.low if grows[0] else max(extent.low, 0.0)
+        high = extent.high if grows[1] else min(extent.high, axis.length)
+        grown = max(abs(low), abs(high - axis.length))
+        axis = _between(axis, low, high, radius)
         if grown < HELD_RADII * radius:
             break
     return _finished(axis, radius, sigma, nearby, is_free)
+
+
+def goes_on(
+    found: FittedElement, radius_share: float, nearby: NearbyPoints, is_free: Flags
+) -> bool:
+    """Return whether a surface like a pipe's goes on beyond an end of a straight one.
+
+    Parameters
+    ----------
+    found : FittedElement
+        About a straight axis.
+    radius_share : float
+        Points count up to this share of the radius off its surface.
+    nearby : NearbyPoints
+    is_free : ndarray of bool
+        Downsampled points that may be on it.
+
+    Returns
+    -------
+    bool
+    """
+    radius, axis = found.fit.model.radius, found.axis
+    low, high = (k * radius for k in BEYOND_RADII)
+    index = nearby.around_axis(axis, radius, high)
+    index = index[is_free[index]]
+    xyz, normals = nearby.surface.xyz[index].astype(np.float64), nearby.surface.normals[index]
+    columns = chainage, _, clock, height, alignment = [np.empty(len(index)) for _ in range(5)]
+    unroll(axis.numbers, radius, 0.0, xyz, normals, *columns)
+    on = (np.abs(height) < radius_share * radius) & (alignment > RADIAL_COS)
+    beyond = chainage < -low, chainage > axis.length + low
+    needed = MIN_ARC_BEYOND * found.extent.arc
+    return any(
+        np.count_nonzero(on & there) >= MIN_POINTS_BEYOND and _arc(clock[on & there]) >= needed
+        for there in beyond
+    )
+
+
+def _sharpest(axis: CurveAxis, radius: float) -> float | None:
+    """Where an axis turns more within `TURN_RADII` than a bowed or kinked pipe does, if it does."""
+    s = np.arange(0.0, axis.length, 0.5 * radius)
+    reach = round(TURN_RADII / 0.5)
+    if len(s) <= reach:
+        return None
+    tangents = axis.tangent(s)
+    cosines = (tangents[reach:] * tangents[:-reach]).sum(axis=1)
+    k = int(np.argmin(cosines))
+    return float(s[k] + 0.5 * TURN_RADII * radius) if cosines[k] < MAX_TURN_COS else None
 
 
 def _n_pieces(length: float, radius: float) -> int:

@@ -1,11 +1,12 @@
 """Straights that follow each other with hardly a turn are one pipe, bowed or kinked."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.refinement.curved_fit import fit_curved_pipe
+from pipecore.elements.refinement.curved_fit import fit_curved_pipe, goes_on
 from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII, Extent
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
@@ -24,8 +25,11 @@ MAX_KINK_COS, MIN_KINKED_RADII = float(np.cos(np.deg2rad(10.0))), 5.0
 this turn: an elbow of so small an angle is rare, and would be short."""
 MAX_KINK_GAP = 2.0
 """Gap at a kink, in radii."""
-MIN_BOW_RADII = 0.1
-"""A pipe bowed by less, in radii, is told by a straight axis: its section model has the bow."""
+MIN_BOW_RADII, MIN_GROWTH_RADII, MIN_STRAIGHT_RADII = 0.03, 0.5, 3.0
+"""A pipe bowed by less, in radii, is told by a straight axis, as is one that grows by no more; and
+shorter pieces are not followed."""
+BEYOND_SHARE = 0.12
+"""Beyond its end a bowed pipe leaves the straight piece's surface by this share of the radius."""
 MIN_INLIERS_SHARE = 0.7
 """A curved pipe has at least this share of the points of the pieces that it takes the place of."""
 MAX_GAP = 12.0
@@ -33,33 +37,85 @@ MAX_GAP = 12.0
 SAME_RADIUS = 0.02
 
 
-def bowed_pipes(
+def join_bowed(
     fitted: list[FittedElement], nearby: NearbyPoints, is_free: Flags
-) -> list[tuple[list[int], FittedElement]]:
-    """Find straights that together are one bowed or kinked pipe.
+) -> list[FittedElement]:
+    """Put one pipe about a curved axis in the place of straights that are pieces of it.
 
     Parameters
     ----------
     fitted : list of FittedElement
+        Straights; others stay as they are.
     nearby : NearbyPoints
     is_free : ndarray of bool
-        Downsampled points that are on none of them.
+        Downsampled points that are on none of them; changed.
 
     Returns
     -------
-    list of (list of int, FittedElement)
-        Numbers of the straights, and the pipe about a curved axis that takes their place.
+    list of FittedElement
+        The bowed pipes in the place of their longest pieces; the other pieces are gone.
     """
-    found = []
-    for group in _groups(fitted):
-        parts = [fitted[i] for i in group]
+    order = sorted(range(len(fitted)), key=lambda i: (-fitted[i].axis.length, i))
+    groups = {i: group for group in _groups(fitted) for i in group}
+    result: list[FittedElement | None] = list(fitted)
+    for i in order:
+        group = [k for k in groups.get(i, [i]) if result[k] is fitted[k]]
+        if i not in group or not _is_straight(fitted[i]):
+            continue
+        alike = [
+            k
+            for k, f in enumerate(result)
+            if f is not None and k not in group and _have_one_radius(fitted[i], f)
+        ]
         usable = is_free.copy()
-        for part in parts:
-            usable[part.inliers] = True
+        for k in (*group, *alike):
+            usable[fitted[k].inliers] = True
+        parts = [fitted[k] for k in group]
+        if len(parts) == 1 and not goes_on(parts[0], BEYOND_SHARE, nearby, usable):
+            continue
         pipe = fit_curved_pipe(parts, nearby, usable)
-        if pipe is not None and _takes_the_place_of(pipe, parts):
-            found.append((group, pipe))
-    return found
+        if pipe is None:
+            continue
+        taken = [k for k in (*group, *alike) if _is_within(fitted[k], pipe)]
+        if not _is_better(pipe, parts, len(taken)) or not set(group) <= set(taken):
+            continue
+        for k in taken:
+            is_free[fitted[k].inliers] = True
+            result[k] = None
+        for k in set(alike) - set(taken):
+            pipe = replace(pipe, inliers=np.setdiff1d(pipe.inliers, fitted[k].inliers))
+        is_free[pipe.inliers] = False
+        result[i] = pipe
+    return [f for f in result if f is not None]
+
+
+def _is_straight(f: FittedElement) -> bool:
+    model = f.fit.model
+    is_pipe = isinstance(model, LineSurface) and not model.is_tapered
+    return is_pipe and f.axis.length > MIN_STRAIGHT_RADII * model.radius
+
+
+def _have_one_radius(a: FittedElement, b: FittedElement) -> bool:
+    one, other = a.fit.model, b.fit.model
+    if not isinstance(other, LineSurface) or other.is_tapered:
+        return False
+    sd = float(np.hypot(a.fit.radius_sd, b.fit.radius_sd))
+    return abs(one.radius - other.radius) < SAME_RADIUS * min(one.radius, other.radius) + 3 * sd
+
+
+def _is_within(part: FittedElement, pipe: FittedElement) -> bool:
+    """Whether a piece's points are on a pipe."""
+    return float(np.mean(np.isin(part.inliers, pipe.inliers))) >= MIN_INLIERS_SHARE
+
+
+def _is_better(pipe: FittedElement, parts: list[FittedElement], n_taken: int) -> bool:
+    """Whether a curved pipe is bowed, and more than the pieces that it was made of."""
+    assert isinstance(pipe.axis, CurveAxis)
+    radius = pipe.fit.model.radius
+    if pipe.axis.bow < MIN_BOW_RADII * radius:
+        return False
+    grown = pipe.axis.length - max(p.axis.length for p in parts)
+    return n_taken > 1 or grown > MIN_GROWTH_RADII * radius
 
 
 def _groups(fitted: list[FittedElement]) -> list[list[int]]:
@@ -73,17 +129,8 @@ def _groups(fitted: list[FittedElement]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _takes_the_place_of(pipe: FittedElement, parts: list[FittedElement]) -> bool:
-    """Whether a curved pipe is bowed, and on the points of the pieces it was made of."""
-    assert isinstance(pipe.axis, CurveAxis)
-    if pipe.axis.bow < MIN_BOW_RADII * pipe.fit.model.radius:
-        return False
-    held = np.isin(np.concatenate([p.inliers for p in parts]), pipe.inliers)
-    return float(np.mean(held)) >= MIN_INLIERS_SHARE
-
-
 def join_straights(
-    fitted: list[FittedElement], links: list[Link], nearby: NearbyPoints
+    fitted: list[FittedElement], links: list[Link]
 ) -> tuple[list[FittedElement], list[Link]]:
     """Join straights of one radius that meet end to end with a turn too small for an elbow.
 
@@ -92,16 +139,10 @@ def join_straights(
     fitted : list of FittedElement
     links : list of (int, int)
         Pairs of elements that belong together; renumbered.
-    nearby : NearbyPoints
     """
-    groups = _groups(fitted)
-    if not groups:
+    pairs = [pair for group in _groups(fitted) for pair in pairwise(group)]
+    if not pairs:
         return fitted, links
-    is_free = np.ones(len(nearby.surface.xyz), np.bool_)
-    for f in fitted:
-        is_free[f.inliers] = False
-    bowed = {tuple(group): pipe for group, pipe in bowed_pipes(fitted, nearby, is_free)}
-    pairs = [pair for group in groups for pair in pairwise(group)]
     label = number_runs(len(fitted), pairs)
     # Numbers in the order of each group's first member.
     _, first, group = np.unique(label, return_index=True, return_inverse=True)
@@ -110,11 +151,7 @@ def join_straights(
     joined = []
     for k in range(len(first)):
         members = [fitted[m] for m in np.flatnonzero(number == k)]
-        if len(members) == 1:
-            joined.append(members[0])
-        else:
-            pipe = bowed.get(tuple(int(m) for m in np.flatnonzero(number == k)))
-            joined.append(pipe if pipe is not None else _joined(members))
+        joined.append(members[0] if len(members) == 1 else _joined(members))
     return joined, [(int(number[a]), int(number[b])) for a, b in links]
 
 
