@@ -17,7 +17,7 @@ from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import OUTER_RADII, NearbyPoints
 from pipecore.elements.refinement.surface_fits import LineSurface, SurfaceFit
 from pipecore.elements.runs.ends import LineIndex, Link
-from pipecore.geometry import LineAxis
+from pipecore.geometry import AnyAxis, ArcAxis, LineAxis
 from pipecore.robust import robust_sd
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def find_flanges(
         model = f.fit.model
         if not isinstance(model, LineSurface) or model.is_tapered:
             continue
-        if not isinstance(f.axis, LineAxis) or f.axis.length < model.radius:
+        if isinstance(f.axis, ArcAxis) or f.axis.length < model.radius:
             continue
         shell = _shell(f.axis, model.radius, nearby, is_free)
         tolerance = max(3.0 * nearby.surface.noise, 0.0025)
@@ -86,7 +86,7 @@ def find_flanges(
 
 
 def _shell(
-    axis: LineAxis, radius: float, nearby: NearbyPoints, is_free: NDArray[np.bool_]
+    axis: AnyAxis, radius: float, nearby: NearbyPoints, is_free: NDArray[np.bool_]
 ) -> _Shell:
     """Free downsampled points wider than the pipe that do not face along it."""
     widest = min(FLANGE_RATIO[1] * radius, radius + MAX_OVERHANG)
@@ -164,7 +164,6 @@ def _fit_ring(
 ) -> FittedElement | None:
     """Fit a ring's radius about the pipe's axis to all points there; None if it is no ring."""
     axis = pipe.axis
-    assert isinstance(axis, LineAxis)
     voxel = nearby.surface.voxel
     near = (shell.chainage > ends[0] - voxel) & (shell.chainage < ends[1] + voxel)
     near &= (np.abs(shell.rho - radius) < 2.0 * tolerance) & is_free[shell.index]
@@ -195,10 +194,10 @@ def _fit_ring(
     covariance = parent.covariance.copy()
     # The pipe's axis is known to within its own standard deviation.
     covariance[4, 4] = sigma**2 / on.sum() + 0.5 * (covariance[0, 0] + covariance[1, 1])
-    start = axis.at(low)
-    model = LineSurface(axis.at(0.5 * (low + high)), axis.direction, radius)
+    start, direction = axis.at(low), np.array(axis.tangent(0.5 * (low + high)))
+    model = LineSurface(axis.at(0.5 * (low + high)), direction, radius)
     fit = SurfaceFit(model, covariance, sigma, int(on.sum()))
-    ring = LineAxis(start, axis.direction, float(high - low))
+    ring = LineAxis(start, direction, float(high - low))
     return FittedElement(fit, ring, inliers, Extent(0.0, ring.length, arc, 1.0, ()), misfit)
 
 
@@ -223,7 +222,7 @@ def pair_flanges(fitted: list[FittedElement]) -> list[Link]:
             if pipe.axis.length < pipe.fit.model.radius:
                 continue
             chainage, rho, _ = pipe.axis.pipe_coordinates(disc.axis.at(disc.axis.length / 2)[None])
-            turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(0.0)))
+            turn = abs(float(disc.axis.tangent(0.0) @ pipe.axis.tangent(chainage[0])))
             reach = REACH_RADII * pipe.fit.model.radius + REACH_M
             near = -reach < chainage[0] < pipe.axis.length + reach
             if near and rho[0] < 0.15 * pipe.fit.model.radius and turn > np.cos(np.deg2rad(12.0)):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pipecore.elements.refinement.extent import Extent
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.runs.ends import AxisSpan, LineIndex
-from pipecore.geometry import AnyAxis, LineAxis
+from pipecore.geometry import AnyAxis, ArcAxis
 
 MIN_BRANCH_SIN = float(np.sin(np.deg2rad(30.0)))
 """A branch leaves its run at this angle or more."""
@@ -64,7 +64,7 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
             outward = tangent if end else -tangent
             for j in lines.near(point, END_DISTANCE_RADII[1] * radii + MAX_GAP * branch.radii[end]):
                 run = spans[j]
-                if i == j or not isinstance(run.axis, LineAxis):
+                if i == j or isinstance(run.axis, ArcAxis):
                     continue
                 radius = max(run.radii)
                 if branch.radii[end] > 1.05 * radius:
@@ -77,14 +77,15 @@ def find_junctions(spans: list[AxisSpan], met: set[tuple[int, int]]) -> list[Jun
                     most = radius + (0.0 if (i, end) in met else MAX_GAP) * branch.radii[end]
                 if not beside or not least < rho[0] < most:
                     continue
-                across = np.cross(outward, run.axis.direction)
+                ahead = run.axis.tangent(chainage[0])
+                across = np.cross(outward, ahead)
                 sine = float(np.linalg.norm(across))
                 towards = run.axis.at(chainage[0]) - point
                 skew = abs(float(towards @ across)) / max(sine, 1e-9)
                 max_skew = MAX_FAR_SKEW if is_far else MAX_SKEW
                 if sine > MIN_BRANCH_SIN and skew < max_skew * radius and towards @ outward > 0:
                     # Where the axes meet, not where the branch ends, is a lateral's middle.
-                    slope = float(outward @ run.axis.direction) / sine
+                    slope = float(outward @ ahead) / sine
                     middle = float(chainage[0]) + slope * float(rho[0])
                     is_wide = branch.radii[end] > MIN_BRANCH_RATIO * radius
                     found.append(Junction(i, j, middle, is_wide))
@@ -157,10 +158,10 @@ def cut_tees(
     parts = []
     for i, (found, axis) in enumerate(zip(fitted, axes, strict=True)):
         middles = [t.chainage for t in tees if t.run == i]
-        if not middles or not isinstance(axis, LineAxis):
+        if not middles or isinstance(axis, ArcAxis):
             parts.append(ElementPart(found, axis, i))
             continue
-        chainage = (xyz[found.inliers] - axis.start) @ axis.direction
+        chainage, _, _ = axis.pipe_coordinates(xyz[found.inliers])
         at = -np.inf
         ends = tee_ends(middles, axis.length, found.fit.model.radius)
         borders = [0.0, *(b for pair in ends for b in pair), axis.length]
@@ -176,10 +177,10 @@ def cut_tees(
 
 
 def _cut(
-    run: FittedElement, axis: LineAxis, low: float, high: float, inliers: NDArray[np.intp]
+    run: FittedElement, axis: AnyAxis, low: float, high: float, inliers: NDArray[np.intp]
 ) -> FittedElement:
     """The stretch of a run between two chainages of its trimmed axis."""
-    part = LineAxis(axis.at(low), axis.direction, high - low)
+    part = axis.part(low, high)
     shift = float(run.axis.pipe_coordinates(part.start[None])[0][0])
     gaps = tuple(
         (max(a - shift, 0.0), min(b - shift, part.length))

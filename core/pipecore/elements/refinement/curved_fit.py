@@ -27,7 +27,7 @@ Flags = NDArray[np.bool_]
 
 PIECE_RADII, FEWEST_PIECES, MOST_PIECES = 2.0, 4, 40
 """Length of the pieces of an axis in radii, and how many it has: a kink is as sharp as these."""
-N_ROUNDS, N_STEPS = 12, 6
+N_ROUNDS, N_STEPS = 40, 6
 """Rounds of growth at most, and steps of the robust fit in each."""
 FIRST_BAND_RADII = 0.12
 """Points count up to this distance from the first axis, radii: pieces are off by as much."""

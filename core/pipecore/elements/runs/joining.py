@@ -25,9 +25,11 @@ MAX_KINK_COS, MIN_KINKED_RADII = float(np.cos(np.deg2rad(10.0))), 5.0
 this turn: an elbow of so small an angle is rare, and would be short."""
 MAX_KINK_GAP = 2.0
 """Gap at a kink, in radii."""
-MIN_BOW_RADII, MIN_GROWTH_RADII, MIN_STRAIGHT_RADII = 0.03, 0.5, 3.0
-"""A pipe bowed by less, in radii, is told by a straight axis, as is one that grows by no more; and
-shorter pieces are not followed."""
+MIN_BOW_RADII, MIN_GROWTH_RADII, MIN_STRAIGHT_RADII = 0.06, 3.0, 3.0
+"""A pipe bowed by less, in radii, is told by a straight axis, as is one that grows by no more.
+Shorter pieces are not followed."""
+CLEAR_RADII = 2.5
+"""The bow is that between so many radii off the ends, where a bend that begins may be followed."""
 BEYOND_SHARE = 0.12
 """Beyond its end a bowed pipe leaves the straight piece's surface by this share of the radius."""
 MIN_INLIERS_SHARE = 0.7
@@ -112,7 +114,10 @@ def _is_better(pipe: FittedElement, parts: list[FittedElement], n_taken: int) ->
     """Whether a curved pipe is bowed, and more than the pieces that it was made of."""
     assert isinstance(pipe.axis, CurveAxis)
     radius = pipe.fit.model.radius
-    if pipe.axis.bow < MIN_BOW_RADII * radius:
+    clear = CLEAR_RADII * radius
+    if pipe.axis.length < 2 * clear + MIN_STRAIGHT_RADII * radius:
+        return False
+    if pipe.axis.part(clear, pipe.axis.length - clear).bow < MIN_BOW_RADII * radius:
         return False
     grown = pipe.axis.length - max(p.axis.length for p in parts)
     return n_taken > 1 or grown > MIN_GROWTH_RADII * radius
