@@ -7,11 +7,13 @@ coordinates* (chainage, distance from the axis, clock angle) and back. See
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -440,6 +442,12 @@ class ArcAxis:
         )
 
 
+def _spline(at: Array, values: Array) -> "CubicSpline":
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - few axes are curves
+
+    return CubicSpline(at, values)
+
+
 N_PIECES = 16
 """Pieces of a bowed axis that is cut out of another."""
 
@@ -483,7 +491,7 @@ class CurveAxis:
         offset = points - chord.start
         along = offset @ chord.direction
         knots = np.linspace(0.0, chord.length, n_pieces + 1)
-        across = CubicSpline(along, np.stack([offset @ up, offset @ right], axis=1))(knots)
+        across = _spline(along, np.stack([offset @ up, offset @ right], axis=1))(knots)
         across[[0, -1]] = 0.0
         return cls(chord.start, chord.end, across[:, 0], across[:, 1])
 
@@ -498,9 +506,9 @@ class CurveAxis:
         return float(np.hypot(self.up, self.right).max())
 
     @cached_property
-    def _spline(self) -> CubicSpline:
+    def _spline(self) -> "CubicSpline":
         knots = np.linspace(0.0, self.chord.length, len(self.up))
-        return CubicSpline(knots, np.stack([self.up, self.right], axis=1), bc_type="not-a-knot")
+        return _spline(knots, np.stack([self.up, self.right], axis=1))
 
     @cached_property
     def _chainage_at_knots(self) -> Array:

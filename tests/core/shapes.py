@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.geometry import Axis, surface_points, unit
+from pipecore.geometry import Axis, CurveAxis, LineAxis, surface_points, unit
 from pipecore.progress import NoProgress
 from pipecore.settings import ThinningSettings
 from pipecore.surface import Order, Surface, sample_surface
@@ -22,6 +22,15 @@ def random_rotation(rng: np.random.Generator) -> Array:
 
 def random_direction(rng: np.random.Generator) -> Array:
     return unit(rng.normal(size=3))
+
+
+def bowed_axis(rng: np.random.Generator, length: float = 0.9, bow: float = 0.04) -> CurveAxis:
+    """An axis with one bow to 12:00 of its chord and a smaller one to both sides."""
+    chord = LineAxis(rng.normal(size=3), random_direction(rng), length)
+    t = np.linspace(0.0, 1.0, 17)
+    up, right = chord.frame(0.0)
+    across = bow * (np.sin(np.pi * t)[:, None] * up + 0.2 * np.sin(2 * np.pi * t)[:, None] * right)
+    return CurveAxis.through(chord.at(t * length) + across)
 
 
 def jittered(

@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from pipecore.geometry import (
     ArcAxis,
     Axis,
+    CurveAxis,
     LineAxis,
+    offsets_from_chord,
     surface_points,
     twelve_o_clock,
     unit,
@@ -42,7 +44,19 @@ def arcs(draw: st.DrawFn) -> ArcAxis:
     )
 
 
-axes = st.one_of(lines(), arcs())
+@st.composite
+def curves(draw: st.DrawFn) -> CurveAxis:
+    """A pipe bowed by up to a twentieth of its length, in one bow or two."""
+    chord = draw(lines())
+    t = np.linspace(0.0, 1.0, 9)
+    bow, other, turn = (draw(st.floats(-0.05, 0.05)) for _ in range(3))
+    up, right = chord.frame(0.0)
+    across = bow * np.sin(np.pi * t)[:, None] * up + other * np.sin(2 * np.pi * t)[:, None] * right
+    across = across + turn * (t * (1 - t))[:, None] * right
+    return CurveAxis.through(chord.at(t * chord.length) + chord.length * across)
+
+
+axes = st.one_of(lines(), arcs(), curves())
 fractions = st.floats(0.0, 1.0)
 clocks = st.floats(0.0, 2 * math.pi)
 
@@ -62,6 +76,8 @@ def test_that_pipe_coordinates_undo_surface_points(
 ) -> None:
     # Within the bend radius, as on every real bend: beyond it a point has two positions.
     radius = relative_radius * (axis.bend_radius if isinstance(axis, ArcAxis) else 1.0)
+    if isinstance(axis, CurveAxis):
+        radius *= 0.1 * axis.length
     point = surface_points(axis, fraction * axis.length, radius, clock)
     chainage, distance, angle = (float(c[0]) for c in axis.pipe_coordinates(point[None]))
     assert chainage == pytest.approx(fraction * axis.length, abs=1e-9)
@@ -92,7 +108,9 @@ def test_that_the_tangent_is_the_slope_of_the_axis(axis: Axis, fraction: float) 
     step = 1e-5 * axis.length
     s = fraction * axis.length
     slope = (axis.at(s + step) - axis.at(s - step)) / (2 * step)
-    np.testing.assert_allclose(slope, axis.tangent(s), atol=1e-4)
+    # A curve counts chainage evenly within each of its pieces.
+    atol = 5e-3 if isinstance(axis, CurveAxis) else 1e-4
+    np.testing.assert_allclose(slope, axis.tangent(s), atol=atol)
 
 
 @given(axes)
@@ -115,6 +133,43 @@ def test_that_reversing_mirrors_the_clock_and_counts_from_the_other_end(
     there = surface_points(axis, fraction * axis.length, 0.01, clock)
     here = surface_points(back, (1 - fraction) * axis.length, 0.01, -clock)
     np.testing.assert_allclose(there, here, atol=1e-9)
+
+
+@given(axes, st.floats(0.0, 0.4), st.floats(0.6, 1.0))
+def test_that_a_part_lies_on_the_whole(axis: Axis, low: float, high: float) -> None:
+    first, last = low * axis.length, high * axis.length
+    part = axis.part(first, last)
+    # A spline through another one is as near as its pieces are short.
+    atol = 2e-4 * axis.length if isinstance(axis, CurveAxis) else 1e-9
+    np.testing.assert_allclose(part.start, axis.at(first), atol=1e-9)
+    np.testing.assert_allclose(part.end, axis.at(last), atol=1e-9)
+    assert part.length == pytest.approx(last - first, abs=atol)
+    s = np.linspace(0.0, last - first, 7)
+    np.testing.assert_allclose(part.at(s), axis.at(first + s), atol=atol)
+
+
+@given(axes, vectors, fractions, clocks)
+def test_that_moving_an_axis_moves_all_about_it(
+    axis: Axis, shift: np.ndarray, fraction: float, clock: float
+) -> None:
+    s = fraction * axis.length
+    there = surface_points(axis, s, 0.02, clock) + shift
+    np.testing.assert_allclose(surface_points(axis.moved(shift), s, 0.02, clock), there, atol=1e-9)
+
+
+@given(curves())
+def test_that_a_curve_goes_through_its_points_and_knows_its_bow(axis: CurveAxis) -> None:
+    s = np.linspace(0.0, axis.length, 400)
+    offset = offsets_from_chord(axis, s)
+    assert np.hypot(*offset.T).max() == pytest.approx(axis.bow, abs=0.02 * axis.bow + 1e-9)
+    _, distance, _ = axis.chord.pipe_coordinates(axis.at(s))
+    np.testing.assert_allclose(np.hypot(*offset.T), distance, atol=1e-9)
+    # Beyond its ends it goes on straight.
+    for end, tangent in ((axis.start, axis.tangent(0.0)), (axis.end, axis.tangent(axis.length))):
+        ahead = 0.3 * (1 if tangent @ (axis.end - axis.start) > 0 else -1)
+        sign = -ahead if end is axis.start else ahead
+        _, off, _ = axis.pipe_coordinates((end + sign * tangent)[None])
+        assert off[0] == pytest.approx(0.0, abs=1e-9)
 
 
 @given(axes)

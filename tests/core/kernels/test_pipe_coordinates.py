@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipecore._kernels.pipe_coordinates import across_axis, polar
+from pipecore._kernels.pipe_coordinates import across_axis, place_on_axis, polar, tangent
 from pipecore.geometry import ArcAxis, LineAxis
-from tests.core.shapes import random_direction, random_rotation
+from tests.core.shapes import bowed_axis, random_direction, random_rotation
 
 pytestmark = pytest.mark.kernels
 
@@ -17,6 +17,7 @@ def axes(rng):
     yield LineAxis(rng.normal(size=3), np.array([0.0, 0.0, 1.0]), 0.9)
     yield ArcAxis(rng.normal(size=3), q[2], q[0], 0.3, 1.2)
     yield ArcAxis(rng.normal(size=3), q[2], q[0], 0.3, 4.0)
+    yield bowed_axis(rng)
 
 
 def test_that_clock_angles_run_from_twelve_to_three_and_on(rng):
@@ -44,6 +45,13 @@ def test_that_points_of_the_axis_have_no_offset(rng):
     for axis in axes(rng):
         for s in (0.0, 0.5 * axis.length, axis.length):
             assert_allclose(across_axis(axis.numbers, *axis.at(s)), [s, 0.0, 0.0], atol=1e-12)
+
+
+def test_that_places_and_tangents_are_those_of_the_axes_beyond_their_ends_too(rng):
+    for axis in axes(rng):
+        for s in rng.uniform(-0.1, axis.length + 0.1, 20):
+            assert_allclose(place_on_axis(axis.numbers, s), axis.at(s), atol=1e-12)
+            assert_allclose(tangent(axis.numbers, s), axis.tangent(s), atol=1e-12)
 
 
 def test_that_an_arc_is_cut_opposite_its_middle(rng):

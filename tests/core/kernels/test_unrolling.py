@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 
 from pipecore._kernels import unrolling
 from pipecore.geometry import ArcAxis, LineAxis, cross, unit
+from tests.core.shapes import bowed_axis
 
 pytestmark = pytest.mark.kernels
 
@@ -14,6 +15,7 @@ def axes(rng):
     normal = unit(rng.normal(size=3))
     yield LineAxis.between(rng.normal(size=3), rng.normal(size=3))
     yield ArcAxis(rng.normal(size=3), normal, unit(cross(normal, rng.normal(size=3))), 0.6, 1.2)
+    yield bowed_axis(rng)
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.3])

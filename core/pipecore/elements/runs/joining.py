@@ -58,7 +58,7 @@ def join_bowed(
         The bowed pipes in the place of their longest pieces; the other pieces are gone.
     """
     order = sorted(range(len(fitted)), key=lambda i: (-fitted[i].axis.length, i))
-    groups = {i: group for group in _groups(fitted) for i in group}
+    groups = {i: group for group in _groups(fitted, MAX_KINK_COS) for i in group}
     result: list[FittedElement | None] = list(fitted)
     for i in order:
         group = [k for k in groups.get(i, [i]) if result[k] is fitted[k]]
@@ -123,10 +123,14 @@ def _is_better(pipe: FittedElement, parts: list[FittedElement], n_taken: int) ->
     return n_taken > 1 or grown > MIN_GROWTH_RADII * radius
 
 
-def _groups(fitted: list[FittedElement]) -> list[list[int]]:
+def _groups(fitted: list[FittedElement], max_turn_cos: float) -> list[list[int]]:
     """Numbers of straights that follow each other as pieces of one pipe, two or more."""
     spans = [AxisSpan(f.axis, f.radii) for f in fitted]
-    pairs = [(i, j) for i, _, j, _ in meeting_ends(spans) if _are_one_pipe(fitted[i], fitted[j])]
+    pairs = [
+        (i, j)
+        for i, _, j, _ in meeting_ends(spans)
+        if _are_one_pipe(fitted[i], fitted[j], max_turn_cos)
+    ]
     label = number_runs(len(fitted), pairs)
     groups: dict[int, list[int]] = {}
     for i in sorted({i for pair in pairs for i in pair}):
@@ -145,7 +149,7 @@ def join_straights(
     links : list of (int, int)
         Pairs of elements that belong together; renumbered.
     """
-    pairs = [pair for group in _groups(fitted) for pair in pairwise(group)]
+    pairs = [pair for group in _groups(fitted, MAX_TURN_COS) for pair in pairwise(group)]
     if not pairs:
         return fitted, links
     label = number_runs(len(fitted), pairs)
@@ -160,7 +164,7 @@ def join_straights(
     return joined, [(int(number[a]), int(number[b])) for a, b in links]
 
 
-def _are_one_pipe(a: FittedElement, b: FittedElement) -> bool:
+def _are_one_pipe(a: FittedElement, b: FittedElement, max_turn_cos: float) -> bool:
     one, other = a.fit.model, b.fit.model
     if not isinstance(one, LineSurface) or not isinstance(other, LineSurface):
         return False
@@ -182,7 +186,7 @@ def _are_one_pipe(a: FittedElement, b: FittedElement) -> bool:
         and gap < MAX_KINK_GAP * smaller
     )
     return (
-        turn_cos > (MAX_KINK_COS if is_kinked else MAX_TURN_COS)
+        turn_cos > (max_turn_cos if is_kinked else MAX_TURN_COS)
         and abs(one.radius - other.radius) < SAME_RADIUS * smaller + 3 * sd
         and gap < MAX_GAP * smaller
     )
