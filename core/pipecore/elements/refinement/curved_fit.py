@@ -44,7 +44,7 @@ BEYOND_RADII, MIN_ARC_BEYOND, MIN_POINTS_BEYOND = (0.8, 1.6), 0.6, 12
 """A pipe goes on where between these distances beyond its end, in radii, points lie around this
 share of its arc."""
 TUKEY_SDS = 4.685
-FIT_POINTS, ROUND_POINTS = 60_000, 12_000
+FIT_POINTS, ROUND_POINTS, BOW_POINTS = 60_000, 12_000, 3_000
 MIN_POINTS = 60
 
 
@@ -146,6 +146,43 @@ def goes_on(
         np.count_nonzero(on & there) >= MIN_POINTS_BEYOND and _arc(clock[on & there]) >= needed
         for there in beyond
     )
+
+
+def bow_of_straight(found: FittedElement, nearby: NearbyPoints) -> float:
+    """Return how far the points on a straight pipe surely say that its axis bows.
+
+    Parameters
+    ----------
+    found : FittedElement
+        About a straight axis.
+    nearby : NearbyPoints
+
+    Returns
+    -------
+    float
+        Height of the parabola above its chord, less three standard deviations, metres;
+        0 where nothing says so.
+    """
+    if len(found.inliers) < MIN_POINTS:
+        return 0.0
+    xyz = nearby.surface.xyz[sample_evenly(found.inliers, BOW_POINTS)].astype(np.float64)
+    residual, _, _ = found.fit.model.residuals(xyz)
+    chainage, _, clock = found.axis.pipe_coordinates(xyz)
+    along = np.polynomial.legendre.legvander(2.0 * chainage / found.axis.length - 1.0, 2)
+    cos, sin = np.cos(clock)[:, None], np.sin(clock)[:, None]
+    columns = [along[:, :1], cos * along, sin * along]
+    if found.extent.arc > OVAL_ARC:
+        columns.append(np.stack([np.cos(2 * clock), np.sin(2 * clock)], axis=1))
+    design = np.concatenate(columns, axis=1)
+    solution, _, rank, _ = np.linalg.lstsq(design, residual, rcond=None)
+    if rank < design.shape[1]:
+        return 0.0
+    left = residual - design @ solution
+    variance = np.linalg.inv(design.T @ design).diagonal() * np.mean(np.square(left))
+    bowed = [3, 6]
+    # The second Legendre polynomial is 1.5 higher at its ends than in the middle.
+    sure = np.linalg.norm(solution[bowed]) - 3.0 * np.sqrt(variance[bowed].max())
+    return 1.5 * max(float(sure), 0.0)
 
 
 def _sharpest(axis: CurveAxis, radius: float) -> float | None:

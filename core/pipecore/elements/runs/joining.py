@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipecore.elements.refinement.curved_fit import fit_curved_pipe, goes_on
+from pipecore.elements.refinement.curved_fit import bow_of_straight, fit_curved_pipe, goes_on
 from pipecore.elements.refinement.extent import MIN_REPORTED_GAP_RADII, Extent
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
@@ -32,6 +32,12 @@ CLEAR_RADII = 2.5
 """The bow is that between so many radii off the ends, where a bend that begins may be followed."""
 BEYOND_SHARE = 0.12
 """Beyond its end a bowed pipe leaves the straight piece's surface by this share of the radius."""
+MIN_SHOWN_BOW_RADII = 0.04
+"""A straight whose own points bow by as much, in radii, is followed; near its line only they do
+less than the pipe."""
+MAX_SCATTER_RATIO, MAX_SCATTER_RATIO_OF_SECTION = 0.95, 1.05
+"""A curve that is hardly longer than the straight in its place scatters less, by this ratio; or
+no more than about a section model, which may have bowed with it."""
 MIN_INLIERS_SHARE = 0.7
 """A curved pipe has at least this share of the points of the pieces that it takes the place of."""
 MAX_GAP = 12.0
@@ -73,13 +79,15 @@ def join_bowed(
         for k in (*group, *alike):
             usable[fitted[k].inliers] = True
         parts = [fitted[k] for k in group]
-        if len(parts) == 1 and not goes_on(parts[0], BEYOND_SHARE, nearby, usable):
+        is_bowed = any(_shows_bow(p, nearby) for p in parts)
+        if len(parts) == 1 and not is_bowed and not goes_on(parts[0], BEYOND_SHARE, nearby, usable):
             continue
         pipe = fit_curved_pipe(parts, nearby, usable)
         if pipe is None:
             continue
         taken = [k for k in (*group, *alike) if _is_within(fitted[k], pipe)]
-        if not _is_better(pipe, parts, len(taken)) or not set(group) <= set(taken):
+        is_better = _is_better(pipe, parts, len(taken), is_bowed=is_bowed)
+        if not is_better or not set(group) <= set(taken):
             continue
         for k in taken:
             is_free[fitted[k].inliers] = True
@@ -110,7 +118,14 @@ def _is_within(part: FittedElement, pipe: FittedElement) -> bool:
     return float(np.mean(np.isin(part.inliers, pipe.inliers))) >= MIN_INLIERS_SHARE
 
 
-def _is_better(pipe: FittedElement, parts: list[FittedElement], n_taken: int) -> bool:
+def _shows_bow(part: FittedElement, nearby: NearbyPoints) -> bool:
+    """Whether a straight's own points leave it as those of a bowed pipe do."""
+    return bow_of_straight(part, nearby) > MIN_SHOWN_BOW_RADII * part.fit.model.radius
+
+
+def _is_better(
+    pipe: FittedElement, parts: list[FittedElement], n_taken: int, *, is_bowed: bool
+) -> bool:
     """Whether a curved pipe is bowed, and more than the pieces that it was made of."""
     assert isinstance(pipe.axis, CurveAxis)
     radius = pipe.fit.model.radius
@@ -120,7 +135,12 @@ def _is_better(pipe: FittedElement, parts: list[FittedElement], n_taken: int) ->
     if pipe.axis.part(clear, pipe.axis.length - clear).bow < MIN_BOW_RADII * radius:
         return False
     grown = pipe.axis.length - max(p.axis.length for p in parts)
-    return n_taken > 1 or grown > MIN_GROWTH_RADII * radius
+    if n_taken > 1 or grown > MIN_GROWTH_RADII * radius:
+        return True
+    # A section model may have followed the bow: then the curve is to be as close to the points.
+    (part,) = parts
+    ratio = MAX_SCATTER_RATIO if part.section is None else MAX_SCATTER_RATIO_OF_SECTION
+    return is_bowed and pipe.fit.sigma < ratio * part.fit.sigma
 
 
 def _groups(fitted: list[FittedElement], max_turn_cos: float) -> list[list[int]]:
