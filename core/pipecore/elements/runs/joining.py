@@ -137,10 +137,12 @@ def _is_better(
     grown = pipe.axis.length - max(p.axis.length for p in parts)
     if n_taken > 1 or grown > MIN_GROWTH_RADII * radius:
         return True
+    if not is_bowed or len(parts) > 1:
+        return False
     # A section model may have followed the bow: then the curve is to be as close to the points.
     (part,) = parts
     ratio = MAX_SCATTER_RATIO if part.section is None else MAX_SCATTER_RATIO_OF_SECTION
-    return is_bowed and pipe.fit.sigma < ratio * part.fit.sigma
+    return pipe.fit.sigma < ratio * part.fit.sigma
 
 
 def _groups(fitted: list[FittedElement], max_turn_cos: float) -> list[list[int]]:
