@@ -33,17 +33,14 @@ def kink(angle_deg: float) -> Callable[[Array], Array]:
 
 
 def scanned(
-    rng: np.random.Generator,
-    sideways: Callable[[Array], Array],
-    arc_deg: float = 360.0,
-    length: float = LENGTH,
+    rng: np.random.Generator, sideways: Callable[[Array], Array], arc_deg: float = 360.0
 ) -> PointCloud:
     """Points around a pipe whose axis is moved sideways, in any attitude."""
-    n = int(2 * np.pi * RADIUS * length / SPACING**2 * arc_deg / 360)
+    n = int(2 * np.pi * RADIUS * LENGTH / SPACING**2 * arc_deg / 360)
     t, theta = rng.uniform(0, 1, n), np.deg2rad(rng.uniform(-arc_deg / 2, arc_deg / 2, n)) + 1.0
     step = 1e-5
-    slope = (sideways(t + step) - sideways(t - step)) / (2 * step * length)
-    centre = np.stack([length * t, sideways(t), np.zeros(n)], axis=1)
+    slope = (sideways(t + step) - sideways(t - step)) / (2 * step * LENGTH)
+    centre = np.stack([LENGTH * t, sideways(t), np.zeros(n)], axis=1)
     ahead = np.stack([np.ones(n), slope, np.zeros(n)], axis=1) / np.sqrt(1 + slope**2)[:, None]
     aside = np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(n)], axis=1)
     across = np.cos(theta)[:, None] * aside + np.sin(theta)[:, None] * np.cross(ahead, aside)
@@ -73,21 +70,12 @@ def test_that_a_bowed_pipe_is_one_with_its_radius_length_and_bow(rng, shape, bow
     assert found.chainage == pytest.approx(LENGTH / 2, abs=0.1)
 
 
-@pytest.mark.parametrize("shape", [arc, sag])
-def test_that_a_small_bow_seen_from_one_side_does_not_widen_the_pipe(rng, shape):
+def test_that_a_small_bow_seen_from_one_side_does_not_widen_the_pipe(rng):
     """One straight carries it all, off by a tenth of the radius, and was 0.4 % too wide."""
-    pipe = only_element(detect(scanned(rng, shape(0.01), arc_deg=150.0)))
+    pipe = only_element(detect(scanned(rng, arc(0.01), arc_deg=150.0)))
     assert isinstance(pipe.axis, CurveAxis)
     assert pipe.radius == pytest.approx(RADIUS, rel=0.003)
     assert pipe.axis.length == pytest.approx(LENGTH, abs=0.04)
-
-
-def test_that_a_bow_that_leaves_gaps_between_its_straights_is_followed(rng):
-    """At a turn of 24° in 18 radii the straights meet with too much of a turn to be joined."""
-    pipe = only_element(detect(scanned(rng, arc(0.1), arc_deg=150.0, length=1.8)))
-    assert isinstance(pipe.axis, CurveAxis)
-    assert pipe.radius == pytest.approx(RADIUS, rel=0.003)
-    assert pipe.axis.length == pytest.approx(1.8, rel=0.02)
 
 
 @pytest.mark.parametrize("angle_deg", [3.0, 8.0])

@@ -33,6 +33,8 @@ FIRST_BAND_RADII = 0.12
 """Points count up to this distance from the first axis, radii: pieces are off by as much."""
 MARGIN_RADII = 2.0
 """How far beyond its ends an axis is looked for in a round."""
+SETTLED_SIGMAS = 0.02
+"""A step that moves the axis by less than this share of the points' scatter is the last."""
 HELD_RADII = 0.25
 """An end that moves by less than this in a round holds still."""
 STIFFNESS_RADII, OVAL_RADII = 0.3, 0.04
@@ -281,11 +283,16 @@ def _moved(
         left = residual - design @ solution
         weight = np.square(np.maximum(1.0 - np.square(left / (TUKEY_SDS * scatter)), 0.0))
         normal = (weight[:, None] * design).T @ design + scatter**2 * prior
-        solution = np.linalg.solve(
-            normal + 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal)),
-            design.T @ (weight * residual),
+        before, solution = (
+            solution,
+            np.linalg.solve(
+                normal + 1e-9 * np.trace(normal) / len(normal) * np.eye(len(normal)),
+                design.T @ (weight * residual),
+            ),
         )
         scatter = max(robust_sd(residual - design @ solution), MIN_SIGMA_M)
+        if np.abs(solution - before).max() < SETTLED_SIGMAS * scatter:
+            break
     up, right = axis.frame(knots)
     to_up, to_right = solution[1 : 1 + n, None], solution[1 + n : 1 + 2 * n, None]
     places = axis.at(knots) + to_up * up + to_right * right

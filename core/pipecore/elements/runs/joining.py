@@ -66,10 +66,12 @@ def join_bowed(
     order = sorted(range(len(fitted)), key=lambda i: (-fitted[i].axis.length, i))
     groups = {i: group for group in _groups(fitted, MAX_KINK_COS) for i in group}
     result: list[FittedElement | None] = list(fitted)
+    tried: set[tuple[int, ...]] = set()
     for i in order:
         group = [k for k in groups.get(i, [i]) if result[k] is fitted[k]]
-        if i not in group or not _is_straight(fitted[i]):
+        if i not in group or not _is_straight(fitted[i]) or tuple(group) in tried:
             continue
+        tried.add(tuple(group))
         alike = [
             k
             for k, f in enumerate(result)
@@ -80,7 +82,11 @@ def join_bowed(
             usable[fitted[k].inliers] = True
         parts = [fitted[k] for k in group]
         is_bowed = any(_shows_bow(p, nearby) for p in parts)
-        if len(parts) == 1 and not is_bowed and not goes_on(parts[0], BEYOND_SHARE, nearby, usable):
+        if not (
+            is_bowed
+            or _leave_line(parts)
+            or any(goes_on(p, BEYOND_SHARE, nearby, usable) for p in parts)
+        ):
             continue
         pipe = fit_curved_pipe(parts, nearby, usable)
         if pipe is None:
@@ -121,6 +127,15 @@ def _is_within(part: FittedElement, pipe: FittedElement) -> bool:
 def _shows_bow(part: FittedElement, nearby: NearbyPoints) -> bool:
     """Whether a straight's own points leave it as those of a bowed pipe do."""
     return bow_of_straight(part, nearby) > MIN_SHOWN_BOW_RADII * part.fit.model.radius
+
+
+def _leave_line(parts: list[FittedElement]) -> bool:
+    """Whether pieces lie on no straight line, together."""
+    ends = np.concatenate([p.axis.at(np.linspace(0.0, p.axis.length, 3)) for p in parts])
+    centred = ends - ends.mean(axis=0)
+    direction = np.linalg.svd(centred, full_matrices=False)[2][0]
+    off = np.linalg.norm(centred - (centred @ direction)[:, None] * direction, axis=1)
+    return bool(off.max() > MIN_SHOWN_BOW_RADII * parts[0].fit.model.radius)
 
 
 def _is_better(
