@@ -90,6 +90,23 @@ def test_that_a_kinked_pipe_is_one_with_its_kink(rng, angle_deg):
     assert found.chainage == pytest.approx(LENGTH / 2, abs=0.1)
 
 
+def test_that_a_gentle_bend_between_straights_is_no_bow(rng):
+    """It turns the run by 45° with a radius of 30 pipe radii: the middle is 10 % off the chord."""
+    half, turn, far = 1.5, np.deg2rad(45.0), 30 * RADIUS
+    n = int(2 * np.pi * RADIUS * (2 * half + far * turn) / 0.008**2)
+    s, theta = rng.uniform(0, 2 * half + far * turn, n), rng.uniform(0, 2 * np.pi, n)
+    phi = np.clip((s - half) / far, 0, turn)
+    beyond = np.maximum(s - half - far * turn, 0)
+    x = np.minimum(s, half) + far * np.sin(phi) + beyond * np.cos(phi)
+    y = far * (1 - np.cos(phi)) + beyond * np.sin(phi)
+    aside = np.stack([-np.sin(phi), np.cos(phi), np.zeros(n)], axis=1)
+    across = np.cos(theta)[:, None] * aside + np.sin(theta)[:, None] * np.array([0.0, 0.0, 1.0])
+    xyz = np.stack([x, y, np.zeros(n)], axis=1) + RADIUS * across
+    result = detect(PointCloud.from_points(xyz + rng.normal(0, 0.0015, xyz.shape)))
+    whole = 2 * half + far * turn
+    assert max(e.axis.length for e in result.elements) < 0.9 * whole
+
+
 def test_that_a_straight_pipe_has_a_straight_axis(rng):
     pipe = only_element(detect(scanned(rng, arc(0.0))))
     assert isinstance(pipe.axis, LineAxis)

@@ -28,6 +28,9 @@ MAX_KINK_GAP = 2.0
 MIN_BOW_RADII, MIN_GROWTH_RADII, MIN_STRAIGHT_RADII = 0.06, 3.0, 3.0
 """A pipe bowed by less, in radii, is told by a straight axis, as is one that grows by no more.
 Shorter pieces are not followed."""
+MAX_BOW_SHARE = 0.06
+"""A pipe bows or sags by 5 % of its length at the most, and some scatter: more is a bend, made to
+turn the run."""
 CLEAR_RADII = 2.5
 """The bow is that between so many radii off the ends, where a bend that begins may be followed."""
 BEYOND_SHARE = 0.12
@@ -144,6 +147,8 @@ def _is_better(
     """Whether a curved pipe is bowed, and more than the pieces that it was made of."""
     assert isinstance(pipe.axis, CurveAxis)
     radius = pipe.fit.model.radius
+    if pipe.axis.bow > MAX_BOW_SHARE * pipe.axis.chord.length:
+        return False
     clear = CLEAR_RADII * radius
     if pipe.axis.length < 2 * clear + MIN_STRAIGHT_RADII * radius:
         return False
