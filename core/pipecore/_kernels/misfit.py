@@ -64,7 +64,8 @@ def sphere_misfit(xyz, chosen, centre, radius, n_sectors, n_around, n_high, min_
 
     Returns
     -------
-    Misfit (infinite where no patch counts), lowest and highest point, metres, and arc, radians.
+    Misfit (infinite where no patch counts), lowest and highest point, metres, arc, radians, and
+    the mean of 1 / points of the patches that count: what noise adds to the squared misfit.
     """
     n = chosen.shape[0]
     patch, residual = np.empty(n, np.int64), np.empty(n)
@@ -81,15 +82,17 @@ def sphere_misfit(xyz, chosen, centre, radius, n_sectors, n_around, n_high, min_
         patch[m] = min(int(turn * n_around), n_around - 1) * n_high + min(step, n_high - 1)
         seen[min(int(turn * n_sectors), n_sectors - 1)] = True
     members, starts = group_by_label(patch, n_around * n_high)
-    total, n_used = 0.0, 0
+    total, n_used, inverse = 0.0, 0, 0.0
     for k in range(n_around * n_high):
         a, b = starts[k], starts[k + 1]
         if b - a >= min_points:
             middle = (b - a) // 2
             total += np.partition(residual[members[a:b]], middle)[middle] ** 2
             n_used += 1
+            inverse += 1.0 / (b - a)
     misfit = math.sqrt(total / n_used) if n_used > 0 else math.inf
-    return misfit, low, high, 2.0 * math.pi * seen.sum() / n_sectors
+    arc = 2.0 * math.pi * seen.sum() / n_sectors
+    return misfit, low, high, arc, inverse / max(n_used, 1)
 
 
 @njit(cache=True, nogil=True)

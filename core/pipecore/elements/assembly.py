@@ -28,7 +28,14 @@ MIN_PIPE_LENGTH_RADII = 6.0
 """A straight that nothing follows is a pipe if it is longer than this many radii, else a vessel."""
 MIN_LONE_LENGTH_RADII, MIN_LONE_LENGTH = 3.0, 0.3
 """Shortest element that is part of no run, in radii or in metres, whichever is less: limbs and
-bodies of people are shorter. A reducer is always part of a run."""
+bodies of people are shorter."""
+
+
+MIN_CONE_ARC, MIN_CONE_COVERAGE = float(np.deg2rad(145.0)), 0.8
+MIN_CONE_LENGTH_RADII, MIN_LONE_TAPER, MAX_LONE_CONE_SD = 0.8, 0.08, 0.0025
+"""What a cone that is part of no run shows at least: arc, share of its length, length in radii of
+its wide end, change of radius in shares of that, and how well its radius is known: limbs and
+folds that taper have radii of 0.4 % and more, real cones of at most 0.1 %."""
 
 
 def build_elements(
@@ -140,13 +147,26 @@ def _is_reported(
         return True
     radius, length = part.found.fit.model.radius, part.axis.length
     is_alone = (run == run[part.whole]).sum() == 1
-    if is_alone and kind is ElementKind.CONE:
+    if is_alone and kind is ElementKind.CONE and not _is_clear_cone(part):
         return False
     if is_alone and length < max(
         settings.min_length_mm / 1e3, min(MIN_LONE_LENGTH_RADII * radius, MIN_LONE_LENGTH)
     ):
         return False
     return kind is not ElementKind.CYLINDER or length >= MIN_LENGTH_RADII * radius
+
+
+def _is_clear_cone(part: ElementPart) -> bool:
+    """Whether a cone without straights is one: limbs taper too, seen from one side and a bit."""
+    radii = replace(part.found, axis=part.axis).radii
+    taper = abs(radii[1] - radii[0]) / max(radii)
+    return (
+        part.found.extent.arc > MIN_CONE_ARC
+        and part.found.extent.coverage > MIN_CONE_COVERAGE
+        and part.axis.length > MIN_CONE_LENGTH_RADII * max(radii)
+        and taper > MIN_LONE_TAPER
+        and part.found.radius_sd < MAX_LONE_CONE_SD * min(radii)
+    )
 
 
 def _number_elements(

@@ -74,10 +74,12 @@ def test_that_a_sphere_is_held_against_the_medians_of_its_patches(rng):
     seen = np.flatnonzero((np.arctan2(out[:, 1], out[:, 0]) > -np.pi / 2) & (out[:, 2] > -0.5))
     departure = np.where(out[:, 2] > 0.0, 0.004, -0.002) + rng.normal(0, 1e-4, n)
     xyz = centre + (radius + departure)[:, None] * out
-    found, low, high, arc = misfit.sphere_misfit(xyz, seen, centre, radius, 36, 12, 8, 5)
+    found, low, high, arc, per_point = misfit.sphere_misfit(xyz, seen, centre, radius, 36, 12, 8, 5)
     # Of eight even steps of height four are above the middle and two below.
     assert found == pytest.approx(np.sqrt((4 * 0.004**2 + 2 * 0.002**2) / 6), rel=0.02)
     assert low == pytest.approx((xyz[seen, 2] - centre[2]).min())
     assert high == pytest.approx((xyz[seen, 2] - centre[2]).max())
     assert arc == pytest.approx(1.5 * np.pi, abs=0.2)
+    # Six of eight steps and three of four quarters are seen: 54 patches of equal area.
+    assert per_point == pytest.approx(54 / len(seen), rel=0.1)
     assert misfit.sphere_misfit(xyz, seen[:3], centre, radius, 36, 12, 8, 5)[0] == np.inf

@@ -11,7 +11,7 @@ from pipecore._kernels.grouping import group_by_label, group_into
 from pipecore._kernels.voxel_hash import rename_voxels
 from pipecore.allocation import Allocate, in_memory
 from pipecore.elements.refinement.section_model import SectionModel
-from pipecore.elements.refinement.surface_fits import SphereSurface, SurfaceModel
+from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface import Surface
@@ -201,7 +201,11 @@ class NearbyPoints:
         -------
         PointsOnSurface
         """
-        inner, outer = INNER_RADII * model.radius, OUTER_RADII * model.radius
+        narrow = wide = model.radius
+        if isinstance(model, LineSurface) and model.is_tapered:
+            ends = axis.at(np.array([-margin, axis.length + margin]))
+            narrow, wide = sorted(max(model.radius_at(end), 0.0) for end in ends)
+        inner, outer = INNER_RADII * narrow, OUTER_RADII * wide
         points = point_search.OrientedPoints(self.surface.xyz, self.surface.normals, is_free)
         target = point_search.Target(model.kind, model.numbers(), band, depth, min_cos)
         tube = cell_search.Tube(axis.numbers, inner, outer, -margin, axis.length + margin)

@@ -78,8 +78,11 @@ def _fitted_sphere(
     fit: SurfaceFit[SphereSurface], inliers: Indices, nearby: NearbyPoints
 ) -> FittedElement:
     model, upright = fit.model, np.array([0.0, 0.0, 1.0])
-    misfit, low, high, arc = sphere_misfit(
+    misfit, low, high, arc, per_point = sphere_misfit(
         nearby.surface.xyz, inliers, model.centre, model.radius, MAX_SECTORS, *SPHERE_PATCHES
     )
+    if np.isfinite(misfit):
+        # Medians of patches scatter by noise as well: π / 2 of the variance of a mean.
+        misfit = float(np.sqrt(max(misfit**2 - 0.5 * np.pi * fit.sigma**2 * per_point, 0.0)))
     axis = LineAxis(model.centre + low * upright, upright, high - low)
     return FittedElement(fit, axis, inliers, Extent(0.0, axis.length, arc, 1.0, ()), misfit)
