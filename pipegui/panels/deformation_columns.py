@@ -12,7 +12,7 @@ from pipecore.formatting import (
 )
 from pipecore.geometry import Array
 from pipecore.report.summary import VERDICT_ORDER
-from pipecore.rules import outside_diameter
+from pipecore.rules import depth_pct_od
 from pipecore.types import Deformation, Element, Result, Review, ReviewState
 from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import format_measure, label_of, mark, tr
@@ -182,9 +182,10 @@ COLUMNS = (
     _number(
         "depth_pct_od",
         mark("% OD"),
-        lambda r: 100 * r.deformation.depth / outside_diameter(r.element, r.deformation.chainage),
+        lambda r: depth_pct_od(r.deformation, r.element)[0],
         1,
         mark("Depth or height in percent of the outside diameter"),
+        field="depth",
     ),
     _number(
         "length_mm",

@@ -15,7 +15,7 @@ from pipecore.formatting import (
 )
 from pipecore.geometry import ArcAxis, Array
 from pipecore.inspection.section import radius_is_measurable
-from pipecore.rules import outside_diameter
+from pipecore.rules import depth_pct_od
 from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipecore.types import (
     Deformation,
@@ -305,7 +305,6 @@ def _setting(settings: Settings, key: str, spec: FieldSpec) -> str:
 def _of_deformation(
     deformation: Deformation, element: Element, result: Result
 ) -> Iterator[Property]:
-    share = 1 / outside_diameter(element, deformation.chainage)
     verdict = deformation.verdict
     yield Property(
         tr("Verdict"),
@@ -321,7 +320,9 @@ def _of_deformation(
     is_bulge = deformation.kind is DeformationKind.BULGE
     name, of_od = (tr("Height"), tr("Height / OD")) if is_bulge else (tr("Depth"), tr("Depth / OD"))
     yield _measure(name, deformation.depth, deformation.depth_sd)
-    yield _measure(of_od, deformation.depth * share, deformation.depth_sd * share, unit="%")
+    share, share_sd = depth_pct_od(deformation, element)
+    if math.isfinite(share):
+        yield _measure(of_od, share / 100, share_sd / 100, unit="%")
     size = f"{1000 * deformation.length:.0f} × {1000 * deformation.width:.0f}"
     yield Property(tr("Length × width"), f"{size} mm", size, hint=tr("Along the axis × around."))
     yield _measure(tr("Chainage"), deformation.chainage, unit="m")

@@ -18,7 +18,7 @@ from pipecore.errors import WriteError
 from pipecore.formatting import format_clock, format_measure
 from pipecore.pipeline import detect
 from pipecore.report import by_verdict, summarise, write_report
-from pipecore.rules import load_rules, outside_diameter, verdict_words
+from pipecore.rules import depth_pct_od, load_rules, verdict_words
 from pipecore.settings import Settings
 from pipecore.tiling import GIB, detect_in_tiles, estimate_need
 from pipecore.types import PointCloud, Result
@@ -97,7 +97,7 @@ def deformation_lines(result: Result) -> list[str]:
     rows = [("#", "kind", "element", "chainage", "clock", "depth (mm)", "% OD", "verdict")]
     for d in by_verdict(result):
         element = result.element(d.element_id)
-        pct_od = 100 * d.depth / outside_diameter(element, d.chainage)
+        pct_od, _ = depth_pct_od(d, element)
         rows.append(
             (
                 str(d.deformation_id),

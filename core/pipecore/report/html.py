@@ -27,8 +27,8 @@ from pipecore.resources import resource
 from pipecore.rules import (
     Rule,
     dent_limit,
+    depth_pct_od,
     load_rules,
-    outside_diameter,
     ovality_sd,
     verdict_words,
 )
@@ -188,8 +188,8 @@ def _remarks(d: Deformation, result: Result) -> list[str]:
 
 
 def _depth_pct_od(d: Deformation, element: Element) -> str:
-    per_od = 100 / outside_diameter(element, d.chainage)
-    return format_measure(per_od * d.depth, per_od * d.depth_sd)
+    value, sd = depth_pct_od(d, element)
+    return format_measure(value, sd) if np.isfinite(value) else ""
 
 
 def _ovality(d: Deformation) -> str:

@@ -22,11 +22,12 @@ from pipecore.inspection.section import radius_is_measurable
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress, in_chunks
 from pipecore.report.world import FileCoordinates
-from pipecore.rules import outside_diameter
+from pipecore.rules import depth_pct_od
 from pipecore.table import Table
 from pipecore.types import (
     Answers,
     Array,
+    DeformationKind,
     ElementKind,
     NominalSize,
     PointCloud,
@@ -190,10 +191,13 @@ def deformations_table(result: Result, reviews: Mapping[int, Review] = NOT_REVIE
     """
     place = FileCoordinates.of(result)
     found = result.deformations
-    diameters = np.array(
-        [outside_diameter(result.element(d.element_id), d.chainage) for d in found]
+    # Of an oval section the amplitude is no depth; `dmax_mm` and `dmin_mm` say its size.
+    is_oval = np.array([d.kind is DeformationKind.OVALITY for d in found], np.bool_)
+    depths, depth_sds = (
+        np.where(is_oval, np.nan, np.array([getattr(d, name) for d in found]))
+        for name in ("depth", "depth_sd")
     )
-    depths = np.array([d.depth for d in found])
+    shares = [depth_pct_od(d, result.element(d.element_id))[0] for d in found]
     said = [reviews.get(d.deformation_id, Review()) for d in found]
     interacts = [("yes" if d.interacts else "no") if d.next_id else "" for d in found]
     return Table(
@@ -207,8 +211,8 @@ def deformations_table(result: Result, reviews: Mapping[int, Review] = NOT_REVIE
             _texts("clock", [format_clock(d.clock) for d in found]),
             *_positions("peak", [d.peak for d in found], place),
             _floats("depth_mm", depths, 1e3, 2),
-            _floats("depth_sd_mm", [d.depth_sd for d in found], 1e3, 3),
-            _floats("depth_pct_od", depths / diameters, 100, 3),
+            _floats("depth_sd_mm", depth_sds, 1e3, 3),
+            _floats("depth_pct_od", shares, 1, 3),
             _floats("length_mm", [d.length for d in found], 1e3, 2),
             _floats("width_mm", [d.width for d in found], 1e3, 2),
             _floats("ovality_pct", [d.ovality for d in found], 100, 3),

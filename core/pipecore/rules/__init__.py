@@ -6,7 +6,13 @@ measurement's uncertainty, and what a scan cannot know is asked for, never assum
 """
 
 from pipecore.rules.judging import Judgement, judge, judge_all, questions_of
-from pipecore.rules.measures import MEASURE_TEXTS, Measure, outside_diameter, ovality_sd
+from pipecore.rules.measures import (
+    MEASURE_TEXTS,
+    Measure,
+    depth_pct_od,
+    outside_diameter,
+    ovality_sd,
+)
 from pipecore.rules.questions import QUESTIONS, QuestionText, accept_if, verdict_words
 from pipecore.rules.reading import list_rules, load_rule, load_rules
 from pipecore.rules.rule import Criterion, DentLimit, Rule, Situation, dent_limit
@@ -23,6 +29,7 @@ __all__ = [
     "Situation",
     "accept_if",
     "dent_limit",
+    "depth_pct_od",
     "judge",
     "judge_all",
     "list_rules",

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from pipecore.types import Deformation, Element
+from pipecore.types import Deformation, DeformationKind, Element
 
 
 class Measure(StrEnum):
@@ -61,6 +61,33 @@ def outside_diameter(element: Element, chainage: float | None = None) -> float:
         return 2 * element.radius
     within = min(max(chainage, 0.0), element.axis.length)
     return 2 * float(element.radius_at(within))
+
+
+WITHOUT_PCT_OD = (
+    DeformationKind.OVALITY,
+    DeformationKind.TWIST,
+    DeformationKind.BOW,
+    DeformationKind.KINK,
+)
+"""Kinds whose size is no share of the diameter: of a section as a whole, or of the axis."""
+
+
+def depth_pct_od(deformation: Deformation, element: Element) -> tuple[float, float]:
+    """Return a depth in percent of the outside diameter there, and its standard deviation.
+
+    Parameters
+    ----------
+    deformation : Deformation
+    element : Element
+
+    Returns
+    -------
+    value, sd : float
+        nan for kinds that it says nothing of: ovality, twist, bow and kink.
+    """
+    if deformation.kind in WITHOUT_PCT_OD:
+        return np.nan, np.nan
+    return measure_of(Measure.DEPTH_PCT_OD, deformation, element)
 
 
 def ovality_sd(deformation: Deformation) -> float:

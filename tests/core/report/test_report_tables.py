@@ -8,7 +8,15 @@ import pytest
 from pipecore.errors import WriteError
 from pipecore.report import write_deformations_csv, write_elements_csv, write_profiles_csv
 from pipecore.settings import Settings
-from pipecore.types import Deformation, Element, NominalSize, Profiles, Review, ReviewState
+from pipecore.types import (
+    Deformation,
+    DeformationKind,
+    Element,
+    NominalSize,
+    Profiles,
+    Review,
+    ReviewState,
+)
 from tests.factories import make_result
 
 ELEMENT_CONTRACT = (
@@ -145,8 +153,11 @@ def test_that_the_deformations_table_gives_back_what_was_measured(tmp_path):
     rows = rows_of(write_deformations_csv, result, tmp_path / "deformations.csv")
     for row, d in zip(rows, result.deformations, strict=True):
         assert (row["kind"], row["verdict"], row["rule"]) == (d.kind, d.verdict, d.rule)
-        assert number(row["depth_mm"]) == pytest.approx(1000 * d.depth, abs=0.005)
-        assert number(row["depth_sd_mm"]) == pytest.approx(1000 * d.depth_sd, abs=0.0005)
+        if d.kind == "ovality":
+            assert (row["depth_mm"], row["depth_sd_mm"], row["depth_pct_od"]) == ("", "", "")
+        else:
+            assert number(row["depth_mm"]) == pytest.approx(1000 * d.depth, abs=0.005)
+            assert number(row["depth_sd_mm"]) == pytest.approx(1000 * d.depth_sd, abs=0.0005)
         assert position(row, "peak") == pytest.approx(d.peak + result.origin, abs=6e-5)
         assert row["strain_pct"] == ""
         assert number(row["area_mm2"]) == pytest.approx(1e6 * d.area, abs=0.5, nan_ok=True)
@@ -161,6 +172,17 @@ def test_that_the_deformations_table_gives_back_what_was_measured(tmp_path):
     assert number(dent["depth_pct_od"]) == pytest.approx(100 * 12.1 / 168.3, abs=5e-4)
     assert dent["ovality_pct"] == ""
     assert number(ovality["ovality_pct"]) == pytest.approx(100 * 4 * 1.6 / 168.3, abs=5e-4)
+
+
+@pytest.mark.parametrize("kind", ["bow", "kink", "ovality", "twist"])
+def test_that_what_is_no_share_of_the_diameter_has_no_percentage(kind, tmp_path):
+    result = make_result(2000)
+    first = replace(result.deformations[0], kind=DeformationKind(kind))
+    rows = rows_of(
+        write_deformations_csv, replace(result, deformations=(first,)), tmp_path / "d.csv"
+    )
+    assert rows[0]["depth_pct_od"] == ""
+    assert (rows[0]["depth_mm"] == "") == (kind == "ovality")
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("ft", 0.3048), ("us-ft", 1200 / 3937)])
