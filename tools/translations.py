@@ -15,10 +15,12 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po, write_po
 
 from pipecore.editing import STAGES as EDITING_STAGES
+from pipecore.elements.gates import refusals
 from pipecore.formatting import NOT_MEASURABLE
 from pipecore.io import file_filter
 from pipecore.io.coordinates import UNIT_LABELS
 from pipecore.io.source import CAUSES, IO_ERROR, NO_SENSE
+from pipecore.nothing_found import ADVICE, OTHERWISE
 from pipecore.pipeline import STAGES
 from pipecore.resources import resource
 from pipecore.rules import MEASURE_TEXTS, QUESTIONS, list_rules
@@ -94,6 +96,7 @@ def tables() -> Iterator[str]:
     for text in QUESTIONS.values():
         yield from (text.question, text.yes, text.no)
     yield from UNIT_LABELS.values()
+    yield from (*refusals.TEXTS, *ADVICE.values(), OTHERWISE)
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():

@@ -31,6 +31,11 @@ def check_result(result: Result) -> None:
     for element in result.elements:
         _check_element(element)
     _check_vectors(result.origin)
+    _check_ids("candidates", [c.candidate_id for c in result.candidates])
+    for candidate in result.candidates:
+        numbers = (candidate.axis.length, candidate.radius, candidate.radius_end)
+        if not all(np.isfinite(n) and n > 0 for n in numbers):
+            raise ValueError(f"candidate {candidate.candidate_id} has no size")
     for deformation in result.deformations:
         _check_vectors(deformation.peak)
     own = {d.element_id for d in result.deformations} | set(result.profiles.element_id.tolist())

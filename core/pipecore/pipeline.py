@@ -13,6 +13,7 @@ from pipecore.deformation import relate_deformations
 from pipecore.elements import NearbyPoints, build_elements, propose_surfaces
 from pipecore.ellipses import Ellipses
 from pipecore.measurement import MeasuringOptions, measure_elements, tabulate_ellipses
+from pipecore.nothing_found import nothing_found_notes
 from pipecore.progress import NoProgress, Progress
 from pipecore.rules import judge_all, load_rules
 from pipecore.segments import StackOverlay
@@ -121,7 +122,9 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
     with timer("elements"):
         proposals = propose_surfaces(ellipses, chains, progress)
         nearby = NearbyPoints(cloud, surface, progress, workspace.allocate)
-        elements = build_elements(proposals, nearby, settings.elements, progress)
+        elements, candidates, n_more = build_elements(
+            proposals, nearby, settings.elements, progress
+        )
         profiles = tabulate_ellipses(elements, ellipses)
     with timer("deformations"):
         measuring = MeasuringOptions(stacks[0].width, settings.deformation, settings.ellipses.fit)
@@ -143,7 +146,13 @@ def detect_in(workspace: Workspace, settings: Settings, progress: Progress) -> R
         deviation=measured.deviation,
         seconds=timer.seconds,
         unit=cloud.unit,
-        notes=(*cloud.notes, *unit_notes(cloud, measured.elements, settings)),
+        notes=(
+            *cloud.notes,
+            *unit_notes(cloud, measured.elements, settings),
+            *(() if elements else nothing_found_notes(surface, candidates, settings)),
+        ),
+        candidates=candidates,
+        n_more_candidates=n_more,
     )
 
 

@@ -50,6 +50,10 @@ def run(args: argparse.Namespace, console: Console) -> None:
     console.say(f"{summarise(result)}.")
     for line in deformation_lines(result):
         console.say(line)
+    n_candidates = len(result.candidates) + result.n_more_candidates
+    if n_candidates:
+        were = "was" if n_candidates == 1 else "were"
+        console.say(f"{n_candidates} more {were} nearly accepted: see candidates.csv")
     console.say(f"Report: {args.output / 'report.html'}")
 
 

@@ -8,6 +8,7 @@ in a detection; the others keep their ids, names and measures.
 >>> result = merge_elements(cloud, result, [3, 5])
 """
 
+from pipecore.editing.accepting import accept_candidate, dismiss_candidates
 from pipecore.editing.changes import (
     delete_elements,
     kinds_of,
@@ -21,11 +22,13 @@ from pipecore.editing.reshaping import STAGES, change_kind, merge_elements, spli
 
 __all__ = [
     "STAGES",
+    "accept_candidate",
     "answer_for_deformation",
     "answer_for_element",
     "change_kind",
     "delete_elements",
     "detect_again",
+    "dismiss_candidates",
     "judge_again",
     "kinds_of",
     "merge_elements",

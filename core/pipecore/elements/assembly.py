@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pipecore.catalogues import with_sizes
 from pipecore.elements.fittings.flanges import pair_flanges
 from pipecore.elements.fittings.tees import ElementPart, Junction, cut_tees, find_junctions
+from pipecore.elements.gates.refusals import too_short
 from pipecore.elements.proposals import Proposal
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
@@ -20,7 +21,7 @@ from pipecore.elements.selection import select_elements
 from pipecore.geometry import AnyAxis
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
-from pipecore.types import Element, ElementKind
+from pipecore.types import Candidate, Element, ElementKind
 
 MIN_LENGTH_RADII = 0.35
 """Shortest cylinder, in radii: a slice of a vessel's head is shorter."""
@@ -43,7 +44,7 @@ def build_elements(
     nearby: NearbyPoints,
     settings: ElementSettings,
     progress: Progress,
-) -> tuple[Element, ...]:
+) -> tuple[tuple[Element, ...], tuple[Candidate, ...], int]:
     """Fit the proposed surfaces, keep those that pass the gates and join them to runs.
 
     Points on one element are not available to the next, so that every surface is
@@ -60,15 +61,19 @@ def build_elements(
 
     Returns
     -------
-    tuple of Element
+    elements : tuple of Element
         The longest run first, along each run; ovality and straightness are not measured yet.
+    candidates : tuple of Candidate
+        What was nearly accepted.
+    n_more : int
+        How many more there are.
 
     Raises
     ------
     CancelledError
         From `progress`.
     """
-    fitted, links = select_elements(proposals, nearby, settings, progress)
+    fitted, links, not_accepted = select_elements(proposals, nearby, settings, progress)
     fitted, links = join_straights(fitted, links)
     axes, met = _trim_axes(fitted, links)
     kinds = [_kind(f) for f in fitted]
@@ -79,14 +84,15 @@ def build_elements(
     links += [(j.branch, j.run) for j in junctions]
     run = number_runs(len(fitted), links)
     tees = [j for j in junctions if _is_tee(j, fitted, kinds, met)]
-    return _number_elements(
-        [
-            (part, ElementKind.TEE if part.is_tee else kinds[part.whole], int(run[part.whole]))
-            for part in cut_tees(fitted, axes, tees, nearby.surface.xyz)
-            if _is_reported(part, kinds[part.whole], run, settings)
-        ],
-        settings,
-    )
+    reported = []
+    for part in cut_tees(fitted, axes, tees, nearby.surface.xyz):
+        kind = kinds[part.whole]
+        if _is_reported(part, kind, run, settings):
+            reported.append((part, ElementKind.TEE if part.is_tee else kind, int(run[part.whole])))
+        elif _is_alone(part, run) and kind is ElementKind.CYLINDER:
+            least = _least_lone_length(part, settings)
+            not_accepted.add_dropped(part.found, too_short(part.axis.length, least))
+    return _number_elements(reported, settings), *not_accepted.candidates()
 
 
 def _spans(axes: list[AnyAxis], fitted: list[FittedElement]) -> list[AxisSpan]:
@@ -146,14 +152,22 @@ def _is_reported(
     if part.is_tee or kind in (ElementKind.SPHERE, ElementKind.FLANGE):
         return True
     radius, length = part.found.fit.model.radius, part.axis.length
-    is_alone = (run == run[part.whole]).sum() == 1
+    is_alone = _is_alone(part, run)
     if is_alone and kind is ElementKind.CONE and not _is_clear_cone(part):
         return False
-    if is_alone and length < max(
-        settings.min_length_mm / 1e3, min(MIN_LONE_LENGTH_RADII * radius, MIN_LONE_LENGTH)
-    ):
+    if is_alone and length < _least_lone_length(part, settings):
         return False
     return kind is not ElementKind.CYLINDER or length >= MIN_LENGTH_RADII * radius
+
+
+def _is_alone(part: ElementPart, run: NDArray[np.int32]) -> bool:
+    return bool((run == run[part.whole]).sum() == 1)
+
+
+def _least_lone_length(part: ElementPart, settings: ElementSettings) -> float:
+    """Shortest length of an element that is part of no run, metres."""
+    by_radius = min(MIN_LONE_LENGTH_RADII * part.found.fit.model.radius, MIN_LONE_LENGTH)
+    return max(settings.min_length_mm / 1e3, by_radius)
 
 
 def _is_clear_cone(part: ElementPart) -> bool:

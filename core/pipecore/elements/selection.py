@@ -8,8 +8,10 @@ from pipecore.elements.fittings.flanges import find_flanges
 from pipecore.elements.fittings.open_ends import extend_open_end
 from pipecore.elements.fittings.reducers import find_steps, fit_reducer
 from pipecore.elements.fittings.straight_ends import straight_ends
-from pipecore.elements.gates.acceptance import passes_gates
+from pipecore.elements.gates.acceptance import failed_gate
+from pipecore.elements.gates.refusals import rounded_corner, shortfall
 from pipecore.elements.gates.rounded_corners import is_rounded_corner
+from pipecore.elements.not_accepted import NotAccepted
 from pipecore.elements.proposals import LONG_STRAIGHT_RADII, Proposal
 from pipecore.elements.refinement.fitted_element import FittedElement
 from pipecore.elements.refinement.nearby_points import NearbyPoints
@@ -21,13 +23,15 @@ from pipecore.elements.speculative_refinement import refine_speculatively
 from pipecore.progress import Progress
 from pipecore.settings import ElementSettings
 
+_Refused = tuple[FittedElement, str]
+"""What was refused, and the gate that it failed."""
 MIN_STRAIGHT_RADII = 1.5
 """Shorter straights wait for the bends: they may be part of one; radii."""
 
 
 def select_elements(
     proposals: list[Proposal], nearby: NearbyPoints, settings: ElementSettings, progress: Progress
-) -> tuple[list[FittedElement], list[Link]]:
+) -> tuple[list[FittedElement], list[Link], NotAccepted]:
     """Refine proposals, the best supported first, and keep those that pass the gates.
 
     Spheres and long straights come first, then the fittings between these straights, then
@@ -47,6 +51,8 @@ def select_elements(
     fitted : list of FittedElement
     links : list of (int, int)
         Numbers of fittings and of the straights that they were fitted to.
+    not_accepted : NotAccepted
+        What was refused.
     """
     selector = Selector(nearby, settings)
     spheres, straights, rest = _by_support(proposals)
@@ -69,7 +75,7 @@ def select_elements(
     selector.try_proposals(short + rest, progress, (0.7, 0.95))
     selector.try_reducers()  # also between what has been found since
     progress.update("elements", 1.0)
-    return selector.result()
+    return *selector.result(), selector.not_accepted
 
 
 def _by_support(proposals: list[Proposal]) -> tuple[list[Proposal], list[Proposal], list[Proposal]]:
@@ -119,6 +125,7 @@ class Selector:
         self.links: list[Link] = []
         self._joined: set[End] = set()
         self._replaced: set[int] = set()
+        self.not_accepted = NotAccepted(nearby.surface, self.is_free)
 
     def try_proposals(
         self,
@@ -132,14 +139,20 @@ class Selector:
         Returns those that could be fitted but are shorter than `min_lengths` radii; they are
         not accepted.
         """
+        refused: dict[int, list[_Refused]] = {}
 
         def refine(proposal: Proposal, used: list[NDArray[np.intp]]) -> FittedElement | None:
-            return self._refine(proposal, self.is_free, used)
+            # One that is refined again is refused again: the last time counts.
+            mine: list[_Refused] = []
+            refused[id(proposal)] = mine
+            return self._refine(proposal, self.is_free, used, mine)
 
         short = []
         refined = refine_speculatively(proposals, refine, self.is_free, progress, span)
         for proposal, found in refined:
+            why = refused.pop(id(proposal))
             if found is None:
+                self._note(why)
                 continue
             if found.axis.length < min_lengths * found.fit.model.radius:
                 short.append(proposal)
@@ -151,7 +164,11 @@ class Selector:
         """Refine a proposal and accept it if it is valid; see `_usable` for `between`."""
         usable = self._usable(between)
         if usable is not None:
-            self._accept_if_valid(self._refine(proposal, usable), between)
+            refused: list[_Refused] = []
+            found = self._refine(proposal, usable, refused=refused)
+            if found is None:
+                self._note(refused)
+            self._accept_if_valid(found, between)
 
     def try_bend(self, corner: Corner, bend_radius: float, between: tuple[End, ...]) -> None:
         """Fit a bend at a corner and accept it if it is valid."""
@@ -230,21 +247,34 @@ class Selector:
         proposal: Proposal,
         usable: NDArray[np.bool_],
         used: list[NDArray[np.intp]] | None = None,
+        refused: list[_Refused] | None = None,
     ) -> FittedElement | None:
-        return refine_proposal(
-            proposal,
-            self._nearby,
-            usable,
-            lambda rough, slack: passes_gates(rough, self._nearby.surface, self._settings, slack),
-            used,
-        )
+        def is_promising(rough: FittedElement, slack: float) -> bool:
+            gate = failed_gate(rough, self._nearby.surface, self._settings, slack)
+            if gate is not None and refused is not None:
+                refused[:] = [(rough, gate)]
+            return gate is None
+
+        return refine_proposal(proposal, self._nearby, usable, is_promising, used)
+
+    def _note(self, refused: list[_Refused]) -> None:
+        """Remember what was refused, if anything could be fitted."""
+        for found, gate in refused:
+            self.not_accepted.add(
+                found, shortfall(found, gate, self._nearby.surface, self._settings)
+            )
 
     def _accept_if_valid(
         self, found: FittedElement | None, between: tuple[End, ...] | None = None
     ) -> bool:
-        if found is None or not passes_gates(found, self._nearby.surface, self._settings):
+        if found is None:
+            return False
+        gate = failed_gate(found, self._nearby.surface, self._settings)
+        if gate is not None:
+            self._note([(found, gate)])
             return False
         if is_rounded_corner(found, self._nearby):
+            self.not_accepted.add(found, rounded_corner())
             return False
         self.accept(found, between)
         return True

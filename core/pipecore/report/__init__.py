@@ -29,9 +29,11 @@ from pipecore.report.result_json import result_to_dict, write_result_json
 from pipecore.report.summary import by_verdict, summarise
 from pipecore.report.tables import (
     NOT_REVIEWED,
+    candidates_table,
     deformations_table,
     elements_table,
     profiles_table,
+    write_csv,
     write_deformations_csv,
     write_elements_csv,
     write_profiles_csv,
@@ -41,6 +43,7 @@ from pipecore.types import PointCloud, Result, Review
 
 __all__ = [
     "by_verdict",
+    "candidates_table",
     "deformations_table",
     "elements_table",
     "load",
@@ -71,9 +74,9 @@ def write_report(
 ) -> tuple[Note, ...]:
     """Write the whole report into a folder: all of it or nothing.
 
-    It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``result.json``,
-    ``segments.laz``, ``report.html`` and ``settings.toml``, and ``deformations.ply`` if the
-    settings ask for a mesh.
+    It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``candidates.csv``,
+    ``result.json``, ``segments.laz``, ``report.html`` and ``settings.toml``, and
+    ``deformations.ply`` if the settings ask for a mesh.
 
     Parameters
     ----------
@@ -118,6 +121,7 @@ def write_report(
         (folder / "settings.toml").write_text(result.settings.to_toml(), encoding="utf-8")
         write_elements_csv(folder / "elements.csv", result, cloud)
         write_deformations_csv(folder / "deformations.csv", result, reviews)
+        write_csv(folder / "candidates.csv", candidates_table(result))
         write_profiles_csv(folder / "profiles.csv", result, progress)
         write_result_json(folder / "result.json", result, progress)
         if cloud is None:

@@ -34,6 +34,7 @@ from pipecore.rules import (
 )
 from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipecore.types import (
+    KIND_LABELS,
     Deformation,
     DeformationKind,
     Element,
@@ -79,6 +80,9 @@ def render_html(cloud: PointCloud, result: Result, progress: Progress | None = N
         figures=_figures(cloud, result, place, progress or NoProgress()),
         blind_spot=_blind_spot(result, rules),
         elements=_element_table(result),
+        candidates=_candidate_table(result, place),
+        n_more_candidates=result.n_more_candidates,
+        notes=[str(note) for note in result.notes if note not in cloud.notes],
         has_strain=any(np.isfinite(d.strain) for d in result.deformations),
         wall_thickness=f"{result.settings.deformation.wall_thickness_mm:g} mm",
         rules=rules,
@@ -250,6 +254,31 @@ def _element_table(result: Result) -> dict[str, Any]:
                 e.not_measurable.get("profiles", ""),
             ]
         )
+    return {"columns": columns, "rows": rows}
+
+
+def _candidate_table(result: Result, place: FileCoordinates) -> dict[str, Any]:
+    columns = [
+        PageColumn("#"),
+        PageColumn("Looked like", numeric=False),
+        PageColumn("Radius (mm)"),
+        PageColumn("Length (m)"),
+        PageColumn("Arc seen (°)"),
+        PageColumn(f"Position x, y, z ({place.unit})"),
+        PageColumn("Why it was not accepted", numeric=False),
+    ]
+    rows = [
+        [
+            str(c.candidate_id),
+            KIND_LABELS[c.kind],
+            format_measure(1000 * c.radius, 1000 * c.radius_sd),
+            format_measure(c.axis.length, decimals=2),
+            f"{np.rad2deg(c.arc):.0f}",
+            place.display(c.axis.at(c.axis.length / 2)),
+            str(c.reason),
+        ]
+        for c in result.candidates
+    ]
     return {"columns": columns, "rows": rows}
 
 

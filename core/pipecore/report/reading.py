@@ -17,7 +17,7 @@ from pipecore.progress import Progress
 from pipecore.reasons import Reason
 from pipecore.report.result_json import FORMAT, FORMAT_VERSION
 from pipecore.settings import Settings
-from pipecore.types import Array, Deformation, Element, Profiles, Result, Stack
+from pipecore.types import Array, Candidate, Deformation, Element, Profiles, Result, Stack
 from pipecore.units import FileUnit
 
 POINT_COLUMNS = {"segment_id": np.int32, "element_id": np.int32, "deviation_mm": np.float32}
@@ -139,6 +139,14 @@ def result_from_dict(plain: Mapping[str, Any]) -> Result:
         own_settings=from_plain(dict[int, Settings], plain.get("own_settings", {})),
         unit=_unit(plain),
         notes=tuple(_note(templates.get(note, note)) for note in plain.get("notes", [])),
+        candidates=from_plain(
+            tuple[Candidate, ...],
+            [
+                {**item, "reason": templates.get(item["reason"], item["reason"])}
+                for item in plain.get("candidates", [])
+            ],
+        ),
+        n_more_candidates=from_plain(int, plain.get("n_more_candidates", 0)),
     )
 
 

@@ -9,7 +9,8 @@ centre, normal, towards_start, bend_radius and bend_angle,
 3:00 (right). Profiles are columns of equal
 length, with nine digits after the point. ``settings`` are those of the detection,
 ``own_settings`` those of elements that were detected again with others, by element id.
-``templates`` gives the sentences of ``notes``, ``not_measurable`` and ``verdict_reason``
+``templates`` gives the sentences of ``notes``, ``not_measurable``, ``verdict_reason`` and
+``reason`` (of ``candidates``, what was nearly accepted)
 that have values in them as template and values, so that they can be said in another
 language. A reader refuses a larger `format_version`; keys may be added within a version.
 """
@@ -82,6 +83,8 @@ def _content(result: Result) -> dict[str, Any]:
             for f in dataclasses.fields(result.profiles)
         },
         "deformations": _plain(result.deformations),
+        "candidates": _plain(result.candidates),
+        "n_more_candidates": result.n_more_candidates,
         "templates": _templates(result),
     }
 
@@ -91,6 +94,7 @@ def _templates(result: Result) -> dict[str, Any]:
     found = (result.elements, result.deformations)
     reasons = [why for items in found for item in items for why in item.not_measurable.values()]
     reasons += [d.verdict_reason for d in result.deformations]
+    reasons += [c.reason for c in result.candidates]
     return {
         str(sentence): {"template": sentence.template, "values": _plain(sentence.values)}
         for sentence in [*result.notes, *reasons]

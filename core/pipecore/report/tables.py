@@ -105,6 +105,7 @@ def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
             _texts("other_nominal_size", [_name(e.other_nominal) for e in elements]),
             _texts("clad", ["yes" if e.is_clad else "" for e in elements]),
             _texts("answers", [_answers(e.answers) for e in elements]),
+            _texts("accepted_by", [e.accepted_by for e in elements]),
         ]
     )
 
@@ -171,6 +172,39 @@ def profiles_table(result: Result) -> Table:
             _floats("semi_minor_sd_mm", p.semi_minor_sd, 1e3, 3),
             _floats("semi_minor_drop_mm", p.minor_drop, 1e3, 2),
             _floats("curvature_variation", p.curvature_variation, 1, 3),
+        ]
+    )
+
+
+def candidates_table(result: Result) -> Table:
+    """Return what was nearly accepted as columns, one row for each.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    Table
+        The names and the values of ``candidates.csv``.
+    """
+    place = FileCoordinates.of(result)
+    found = result.candidates
+    return Table(
+        [
+            _integers("candidate_id", [c.candidate_id for c in found]),
+            _texts("kind", [str(c.kind) for c in found]),
+            _floats("radius_mm", [c.radius for c in found], 1e3, 2),
+            _floats("radius_sd_mm", [c.radius_sd for c in found], 1e3, 3),
+            _floats("length_m", [c.axis.length for c in found], 1, 4),
+            _angles("arc_deg", [c.arc for c in found]),
+            _integers("n_points", [c.n_points for c in found]),
+            *_positions("start", [c.axis.start for c in found], place),
+            *_positions("end", [c.axis.end for c in found], place),
+            _texts("reason", [str(c.reason) for c in found]),
+            _floats("value", [c.value for c in found], 1, 3),
+            _floats("limit", [c.limit for c in found], 1, 3),
+            _texts("unit", [c.unit for c in found]),
         ]
     )
 

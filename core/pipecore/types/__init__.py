@@ -6,6 +6,7 @@ that the scan cannot carry are nan, never a guess.
 """
 
 from pipecore.types.arrays import Array, Floats
+from pipecore.types.candidate import Candidate
 from pipecore.types.cloud import Field, PointCloud, Reading, Storage
 from pipecore.types.deformation import (
     Deformation,
@@ -27,6 +28,7 @@ __all__ = [
     "OWN_STACK",
     "Answers",
     "Array",
+    "Candidate",
     "Condition",
     "Deformation",
     "DeformationKind",

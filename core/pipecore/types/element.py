@@ -101,6 +101,8 @@ class Element(Summarised):
         Whether a person chose the size; then limits in percent refer to its diameter.
     answers : mapping of Question to bool
         What a person said of the whole element: whether it is clad, a whole joint, …
+    accepted_by : str
+        "person" if a person accepted it among the candidates, else "".
     """
 
     element_id: int
@@ -126,6 +128,7 @@ class Element(Summarised):
     other_nominal: NominalSize | None = None
     is_nominal_confirmed: bool = False
     answers: Answers = field(default_factory=dict)
+    accepted_by: str = ""
 
     @property
     def is_clad(self) -> bool:

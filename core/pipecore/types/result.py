@@ -15,6 +15,7 @@ from pipecore.notes import Note
 from pipecore.settings import LengthUnit, Settings
 from pipecore.table import Table
 from pipecore.types.arrays import Array
+from pipecore.types.candidate import Candidate
 from pipecore.types.cloud import PointCloud
 from pipecore.types.deformation import Deformation
 from pipecore.types.element import KIND_LABELS, Element
@@ -62,7 +63,12 @@ class Result(Summarised):
     unit : FileUnit
         Unit of the file's coordinates, as the cloud was read; see `file_unit`.
     notes : tuple of Note
-        What was noted when the cloud was read.
+        What was noted when the cloud was read, and why nothing was found if nothing was.
+    candidates : tuple of Candidate
+        What was nearly accepted, in the order of their ids; those that a person accepts or
+        dismisses leave it.
+    n_more_candidates : int
+        How many more there were, which are not kept.
     """
 
     settings: Settings
@@ -82,6 +88,8 @@ class Result(Summarised):
     own_settings: Mapping[int, Settings] = field(default_factory=dict)
     unit: FileUnit = FileUnit()
     notes: tuple[Note, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    n_more_candidates: int = 0
 
     @property
     def file_unit(self) -> FileUnit:
@@ -141,6 +149,19 @@ class Result(Summarised):
         """
         return find_by_id(self.deformations, "deformation_id", deformation_id)
 
+    def candidate(self, candidate_id: int) -> Candidate:
+        """Return the candidate with this id; `KeyError` if there is none.
+
+        Parameters
+        ----------
+        candidate_id : int
+
+        Returns
+        -------
+        Candidate
+        """
+        return find_by_id(self.candidates, "candidate_id", candidate_id)
+
     def deformations_of(self, element_id: int) -> tuple[Deformation, ...]:
         """Return the deformations of one element.
 
@@ -183,6 +204,15 @@ class Result(Summarised):
         Table
         """
         return pipecore.report.deformations_table(self)
+
+    def candidates_table(self) -> Table:
+        """Return what was nearly accepted as ``candidates.csv`` has it.
+
+        Returns
+        -------
+        Table
+        """
+        return pipecore.report.candidates_table(self)
 
     def save(
         self,

@@ -25,6 +25,7 @@ FILES = {
     "elements.csv",
     "profiles.csv",
     "deformations.csv",
+    "candidates.csv",
     "result.json",
     "segments.laz",
     "report.html",

@@ -105,6 +105,7 @@ def test_that_a_result_saves_without_its_cloud(edited: Result, tmp_path: Path) -
     folder = tmp_path / "report"
     edited.save(folder)
     assert sorted(path.name for path in folder.iterdir()) == [
+        "candidates.csv",
         "deformations.csv",
         "elements.csv",
         "profiles.csv",

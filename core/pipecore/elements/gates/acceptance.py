@@ -125,9 +125,13 @@ def radius_is_within_limits(candidate: Candidate) -> bool:
 
 def scatter_is_low(candidate: Candidate) -> bool:
     """Whether the points scatter about the surface hardly more than about their local planes."""
+    return bool(candidate.found.fit.sigma <= candidate.slack * scatter_limit(candidate))
+
+
+def scatter_limit(candidate: Candidate) -> float:
+    """Largest scatter of the points about the surface, metres."""
     wavy = _allowed_waviness(candidate, *SCATTER)
-    limit = min(max(4.0 * candidate.surface.noise, 0.004, wavy), 0.08 * candidate.radius)
-    return bool(candidate.found.fit.sigma <= candidate.slack * limit)
+    return min(max(4.0 * candidate.surface.noise, 0.004, wavy), 0.08 * candidate.radius)
 
 
 def _allowed_waviness(candidate: Candidate, least: float, most: float) -> float:
@@ -154,16 +158,23 @@ def has_enough_points(candidate: Candidate) -> bool:
 
 def sphere_fits_everywhere(candidate: Candidate) -> bool:
     """Whether every patch of a sphere is on it."""
+    return candidate.misfit < sphere_misfit_limit(candidate)
+
+
+def sphere_misfit_limit(candidate: Candidate) -> float:
+    """Largest misfit of a sphere, metres."""
     share, more = MAX_SPHERE_MISFIT
-    return candidate.misfit < share * candidate.radius + more
+    return share * candidate.radius + more
 
 
 def section_is_round(candidate: Candidate) -> bool:
     """Whether the mean section is a circle or an oval."""
-    return (
-        candidate.misfit
-        < MAX_MISFIT * candidate.radius + MAX_NOISE_MISFIT * candidate.found.fit.sigma
-    )
+    return candidate.misfit < misfit_limit(candidate)
+
+
+def misfit_limit(candidate: Candidate) -> float:
+    """Largest misfit of a section, metres."""
+    return MAX_MISFIT * candidate.radius + MAX_NOISE_MISFIT * candidate.found.fit.sigma
 
 
 def axis_is_covered(candidate: Candidate) -> bool:
@@ -173,24 +184,37 @@ def axis_is_covered(candidate: Candidate) -> bool:
 
 def arc_is_wide_enough(candidate: Candidate) -> bool:
     """Whether points lie around enough of the axis; less for a straight of precise radius."""
+    return bool(candidate.arc >= arc_limit(candidate) / candidate.slack)
+
+
+def arc_limit(candidate: Candidate) -> float:
+    """Least arc that a tube shows, radians."""
     is_straight = isinstance(candidate.found.fit.model, LineSurface)
     is_very_sharp = is_straight and candidate.relative_sd < VERY_SHARP_RADIUS_SD
-    return bool(candidate.arc >= (MIN_SHARP_ARC if is_very_sharp else MIN_ARC) / candidate.slack)
+    return float(MIN_SHARP_ARC if is_very_sharp else MIN_ARC)
 
 
 def radius_is_precise_for_its_arc(candidate: Candidate) -> bool:
     """Whether the radius is precise, where the arc is short."""
+    return candidate.arc >= SURE_ARC or candidate.relative_sd < precision_limit(candidate)
+
+
+def precision_limit(candidate: Candidate) -> float:
+    """Largest standard deviation of the radius on a short arc, as a share of it."""
     is_long = isinstance(candidate.found.fit.model, LineSurface) and candidate.lengths > LONG
-    return candidate.arc >= SURE_ARC or candidate.relative_sd < (
-        LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
-    )
+    return LONG_RADIUS_SD if is_long else SHARP_RADIUS_SD
 
 
 def surface_is_smooth(candidate: Candidate) -> bool:
     """Whether a final fit leaves its shape in places only, not all over as cloth does."""
     if candidate.slack > 1.0:
         return True
-    return not candidate.waviness > _allowed_waviness(candidate, *WAVINESS)
+    return not candidate.waviness > waviness_limit(candidate)
+
+
+def waviness_limit(candidate: Candidate) -> float:
+    """Largest waviness of the surface, metres."""
+    return _allowed_waviness(candidate, *WAVINESS)
 
 
 def is_surface_of_revolution(candidate: Candidate) -> bool:
@@ -249,9 +273,14 @@ def cone_tapers_clearly(candidate: Candidate) -> bool:
 
 def cylinder_is_long_enough(candidate: Candidate) -> bool:
     """Whether a cylinder is longer than a few points, and than a slice of a vessel's head."""
+    return candidate.found.axis.length > length_limit(candidate)
+
+
+def length_limit(candidate: Candidate) -> float:
+    """Least length of a cylinder, metres."""
     is_wide = candidate.radius > WIDE and candidate.arc < WHOLE_ARC
     shortest = MIN_WIDE_LENGTH * candidate.radius if is_wide else 0.0
-    return candidate.found.axis.length > max(MIN_VOXELS * candidate.surface.voxel, shortest)
+    return max(MIN_VOXELS * candidate.surface.voxel, shortest)
 
 
 Gate = Callable[[Candidate], bool]
