@@ -14,6 +14,7 @@ COMMANDS = {
     NodeKind.RUN: selection_commands.select_run,
     NodeKind.ELEMENT: selection_commands.select_element,
     NodeKind.DEFORMATION: selection_commands.select_deformation,
+    NodeKind.CANDIDATE: selection_commands.select_candidate,
 }
 
 

@@ -12,7 +12,14 @@ from pipecore.catalogues import sizes_of_all
 from pipecore.rules import QUESTIONS, questions_of
 from pipecore.types import ElementKind, PointCloud, Question, Result, ReviewState
 from pipegui.controllers.session import Session
-from pipegui.i18n.texts import first_capital, format_measure, label_of, mark, tr
+from pipegui.i18n.texts import (
+    candidate_label,
+    first_capital,
+    format_measure,
+    label_of,
+    mark,
+    tr,
+)
 from pipegui.model import commands, element_commands
 from pipegui.model.document import Scan
 from pipegui.model.result_queries import rules_of
@@ -119,7 +126,24 @@ class ElementEdits(QObject):
         if deformation_id:
             self._session.do(commands.set_review, [deformation_id], state)
 
+    def dismiss_candidate(self) -> None:
+        """Take the selected candidate from the list of what was not accepted."""
+        candidate_id = self._session.document.selection.candidate_id
+        self._session.do(element_commands.dismiss_candidates, [candidate_id])
+
     # In the background
+
+    def accept_candidate(self) -> None:
+        """Make an element of the selected candidate, measured like any other."""
+        from pipecore.editing import accept_candidate  # noqa: PLC0415 - loads numba
+
+        _, result, _ = self._targets()
+        candidate_id = self._session.document.selection.candidate_id
+        self._run_edit(
+            tr("Measuring"),
+            tr("Accept {name}").format(name=candidate_label(result.candidate(candidate_id))),
+            lambda c, r, p: accept_candidate(c, r, candidate_id, p),
+        )
 
     def merge(self) -> None:
         """Make one element of the selected ones."""

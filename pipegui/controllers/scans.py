@@ -150,7 +150,8 @@ class Scans(QObject):
         """Take the result of a detection, and sum it up in a message."""
         session = self._session
         session.do(commands.set_result, cloud, result)
-        hint = "" if result.elements else tr(". Check the length unit and the smallest radius")
+        n_candidates = len(result.candidates) + result.n_more_candidates
+        candidates = tr(", {n} not accepted").format(n=n_candidates) if n_candidates else ""
         seconds = sum(result.seconds.values())
         took = tr(" Detected in {seconds:.0f} s.").format(seconds=seconds) if seconds >= 1 else ""
         severity = "info" if result.elements else "warning"
@@ -158,7 +159,7 @@ class Scans(QObject):
         active = session.document.scan
         scan = next((s for s in session.document.scans if s.cloud is cloud), None)
         whose = f"{scan.name}: " if scan is not None and scan is not active else ""
-        text = f"{whose}{descriptions.summary(result)}{hint}.{took}"
+        text = f"{whose}{descriptions.summary(result)}{candidates}.{took}"
         answers: Mapping[str, Callable[[], object]] = {}
         # The notes on the cloud were said when it was read.
         if notes := [note for note in result.notes if note not in cloud.notes]:

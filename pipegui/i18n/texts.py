@@ -14,7 +14,7 @@ from pipecore.errors import PipecoreError
 from pipecore.formatting import NOT_MEASURABLE
 from pipecore.formatting import format_measure as _format_measure
 from pipecore.resources import resource
-from pipecore.types import Element, Result
+from pipecore.types import KIND_LABELS, Candidate, Element, Result
 
 LANGUAGES = {"": "System", "en": "English", "de": "Deutsch"}
 """Names of the languages by their codes, each in its own; "" is the system's."""
@@ -87,6 +87,11 @@ def label_of(element: Element) -> str:
     """Return the name of an element: its own, else such as "Pipe 3"."""
     kind = element.label.removesuffix(f" {element.element_id}")
     return element.name or f"{tr(kind)} {element.element_id}"
+
+
+def candidate_label(candidate: Candidate) -> str:
+    """Return the name of a candidate, such as "Pipe 3?"."""
+    return f"{tr(KIND_LABELS[candidate.kind])} {candidate.candidate_id}?"
 
 
 def run_label(result: Result, run_id: int) -> str:

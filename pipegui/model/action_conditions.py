@@ -33,6 +33,8 @@ def action_conditions(document: Document, *, is_busy: bool) -> Mapping[str, bool
         "one_element": bool(selection.element_id) and len(elements) == 1,
         "several_elements": len(elements) > 1 and bool(selection.others),
         "deformation": bool(selection.deformation_id),
+        "candidate": bool(selection.candidate_id),
+        "candidates": result is not None and bool(result.candidates),
         "stack": view.colour_by is ColourBy.PROFILE and bool(view.shown_stack),
         "box": view.clip_box is not None,
         "measured": bool(view.measurements),

@@ -357,9 +357,11 @@ def set_stations_hidden(document: Document, station_ids: Iterable[int], hidden: 
 def isolate(document: Document) -> Document:
     """Hide all elements but those of the selection."""
     result, selection = document.result, document.selection
-    if result is None or selection == Selection():
+    if result is None:
         return document
     kept = set(elements_of(result, selection))
+    if not kept:
+        return document
     hidden = frozenset(e.element_id for e in result.elements) - kept
     return set_view(document, hidden_elements=hidden)
 

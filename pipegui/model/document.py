@@ -97,6 +97,8 @@ class Selection:
     profile: ProfileKey | None = None
     others: frozenset[int] = frozenset()
     """More elements, for edits of several; plots and properties show `element_id`."""
+    candidate_id: int = NO_ID
+    """What was nearly accepted; then nothing else is selected."""
 
     @property
     def lead(self) -> "Selection":

@@ -35,6 +35,23 @@ def delete_elements(document: Document, element_ids: Collection[int]) -> Documen
     )
 
 
+@step(mark("Dismiss what was not accepted"))
+def dismiss_candidates(document: Document, candidate_ids: Collection[int]) -> Document:
+    """Take candidates from the list of what was not accepted."""
+    from pipecore import editing  # noqa: PLC0415 - loads numba
+
+    if document.result is None or not candidate_ids:
+        return document
+    result = editing.dismiss_candidates(document.result, candidate_ids)
+    return _with_result(document, document.active, result)
+
+
+def dismiss_all_candidates(document: Document) -> Document:
+    """Empty the list of what was not accepted."""
+    candidates = document.result.candidates if document.result is not None else ()
+    return dismiss_candidates(document, [c.candidate_id for c in candidates])
+
+
 @step(
     lambda document, element_id, name: tr("Rename {names}").format(
         names=_names(document, [element_id])

@@ -9,7 +9,17 @@ import numpy as np
 
 from pipecore.geometry import Array
 from pipecore.report.summary import by_verdict
-from pipecore.types import NO_ID, OWN_STACK, Deformation, Element, ElementKind, Result, Review
+from pipecore.types import (
+    NO_ID,
+    OWN_STACK,
+    Candidate,
+    Deformation,
+    Element,
+    ElementKind,
+    Result,
+    Review,
+    SurfaceOfRevolution,
+)
 from pipegui.model.document import ProfileKey, Selection
 
 
@@ -111,6 +121,8 @@ def carry_over_selection(selection: Selection, old: Result | None, new: Result |
         return selection
     if old is None or new is None:
         return Selection()
+    if selection.candidate_id:
+        return _of_candidate(old.candidate(selection.candidate_id), new)
     if not selection.element_id:
         return Selection(run_id=_same_run(selection.run_id, old, new))
     element = old.element(selection.element_id)
@@ -130,6 +142,14 @@ def carry_over_selection(selection: Selection, old: Result | None, new: Result |
             profile = nearest_profile(new, twin.element_id, float(chainage[0]))
             kept = Selection(kept.run_id, kept.element_id, kept.deformation_id, profile)
     return kept
+
+
+def _of_candidate(candidate: Candidate, new: Result) -> Selection:
+    """Select the same candidate where it still is one, else the element that it has become."""
+    if any(c is candidate for c in new.candidates):
+        return Selection(candidate_id=candidate.candidate_id)
+    twin = _same_element(candidate, new)
+    return selection_of_element(new, twin.element_id if twin is not None else NO_ID)
 
 
 def _same_run(run_id: int, old: Result, new: Result) -> int:
@@ -169,26 +189,26 @@ def carry_over_reviews(
     return kept
 
 
-def _middle(element: Element) -> Array:
-    if element.kind is ElementKind.SPHERE:
-        return element.centre
-    return element.axis.at(element.axis.length / 2)
+def _middle(surface: SurfaceOfRevolution) -> Array:
+    if surface.kind is ElementKind.SPHERE:
+        return surface.centre
+    return surface.axis.at(surface.axis.length / 2)
 
 
-def _same_element(element: Element, result: Result) -> Element | None:
+def _same_element(surface: SurfaceOfRevolution, result: Result) -> Element | None:
     """The element of `result` about the same axis with about the same radius."""
-    middle = _middle(element)
+    middle = _middle(surface)
     best, least = None, 0.5
-    for candidate in result.elements:
-        if candidate.kind is ElementKind.SPHERE:
-            offset = float(np.linalg.norm(middle - candidate.centre))
+    for element in result.elements:
+        if element.kind is ElementKind.SPHERE:
+            offset = float(np.linalg.norm(middle - element.centre))
         else:
-            chainage, off_axis, _ = candidate.axis.pipe_coordinates(middle[None])
-            beyond = max(-chainage[0], chainage[0] - candidate.axis.length, 0.0)
+            chainage, off_axis, _ = element.axis.pipe_coordinates(middle[None])
+            beyond = max(-chainage[0], chainage[0] - element.axis.length, 0.0)
             offset = float(off_axis[0]) + beyond
-        difference = (abs(candidate.radius - element.radius) + offset) / element.radius
+        difference = (abs(element.radius - surface.radius) + offset) / surface.radius
         if difference < least:
-            best, least = candidate, difference
+            best, least = element, difference
     return best
 
 

@@ -42,6 +42,11 @@ def select_deformation(document: Document, deformation_id: int) -> Document:
     return select(document, selection_of_deformation(document.result, deformation_id))
 
 
+def select_candidate(document: Document, candidate_id: int) -> Document:
+    """Select what was not accepted."""
+    return select(document, Selection(candidate_id=candidate_id))
+
+
 def select_point(document: Document, point_index: int) -> Document:
     """Select the element of a point of the cloud; nothing for -1."""
     if document.result is None:

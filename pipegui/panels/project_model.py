@@ -18,7 +18,17 @@ from PySide6.QtGui import QFont, QIcon
 
 from pipecore.report.summary import by_verdict
 from pipecore.types import NO_ID, Deformation, Element, PointCloud, Result
-from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
+from pipegui.i18n.reason_texts import reason_text
+from pipegui.i18n.texts import (
+    candidate_label,
+    count,
+    first_capital,
+    format_measure,
+    label_of,
+    mark,
+    run_label,
+    tr,
+)
 from pipegui.model.document import Scan, Selection
 from pipegui.model.stations import stations_of
 from pipegui.states import descriptions
@@ -42,6 +52,8 @@ class NodeKind(Enum):
     ELEMENT = "element"
     DEFORMATIONS = "deformations"
     DEFORMATION = "deformation"
+    CANDIDATES = "candidates"
+    CANDIDATE = "candidate"
     STATIONS = "stations"
     STATION = "station"
 
@@ -140,6 +152,18 @@ class ProjectModel(QAbstractItemModel):
             self._add(branch)
             for deformation in ranked:
                 self._add_deformation(branch, deformation, result)
+
+        if result.candidates:
+            branch = _Node(NodeKind.CANDIDATES, node, index)
+            branch.text = tr("Not accepted ({n})").format(n=len(result.candidates))
+            branch.icon, branch.hint = "eye-off-outline", descriptions.candidates_hint(result)
+            self._add(branch)
+            for candidate in result.candidates:
+                row = _Node(NodeKind.CANDIDATE, branch, index, candidate.candidate_id)
+                row.text, row.icon = candidate_label(candidate), theme.ELEMENT_ICON[candidate.kind]
+                row.radius = format_measure(1000 * candidate.radius, decimals=1)
+                row.hint = reason_text(candidate.reason)
+                self._add(row)
 
     def _add_stations(self, parent: _Node, index: int, cloud: PointCloud) -> None:
         stations = stations_of(cloud)
@@ -324,7 +348,9 @@ class ProjectModel(QAbstractItemModel):
 
     def index_of(self, scan_index: int, selection: Selection) -> QModelIndex:
         """Return the node of a selection, the invalid index for nothing."""
-        if selection.deformation_id:
+        if selection.candidate_id:
+            wanted = (NodeKind.CANDIDATE, selection.candidate_id)
+        elif selection.deformation_id:
             wanted = (NodeKind.DEFORMATION, selection.deformation_id)
         elif selection.element_id:
             wanted = (NodeKind.ELEMENT, selection.element_id)
@@ -348,11 +374,17 @@ class ProjectModel(QAbstractItemModel):
         nodes = [node for node in self.nodes[1:] if node.children]
         return [self.createIndex(node.row, NAME, node.number) for node in nodes]
 
+    def folded(self) -> list[QModelIndex]:
+        """Return the branches that are closed until somebody opens them."""
+        nodes = [node for node in self.nodes if node.kind is NodeKind.CANDIDATES]
+        return [self.createIndex(node.row, NAME, node.number) for node in nodes]
+
     def spanned(self) -> list[QModelIndex]:
         """Return the nodes whose name may take the whole width."""
         kinds = (
             NodeKind.DEFORMATIONS,
             NodeKind.DEFORMATION,
+            NodeKind.CANDIDATES,
             NodeKind.STATIONS,
             NodeKind.STATION,
         )

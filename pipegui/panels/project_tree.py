@@ -95,13 +95,15 @@ class ProjectTree(QWidget):
         """Show a state."""
         before, self._state = self._state, state
         with self._applying:
-            closed = self._closed()
+            closed, opened = self._closed(), self._opened()
             is_new = self.model.apply(state)
             if is_new:
                 self.view.expandToDepth(2)
                 for index in self.model.branches():
                     if self.model.what(index) in closed:
                         self.view.collapse(index)
+                for index in self.model.folded():
+                    self.view.setExpanded(index, self.model.what(index) in opened)
                 for index in self.model.spanned():
                     self.view.setFirstColumnSpanned(index.row(), index.parent(), True)
                 self._filter(self.filter.text())
@@ -128,6 +130,11 @@ class ProjectTree(QWidget):
         """Return the branches that the user has closed."""
         view, branches = self.view, self.model.branches()
         return {self.model.what(index) for index in branches if not view.isExpanded(index)}
+
+    def _opened(self) -> set[tuple[int, NodeKind, int]]:
+        """Return the branches, closed by themselves, that the user has opened."""
+        view, model = self.view, self.model
+        return {model.what(index) for index in model.folded() if view.isExpanded(index)}
 
     def _show_selection(self) -> None:
         index = self.model.index_of(self._state.active, self._state.selection)

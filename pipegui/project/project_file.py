@@ -330,6 +330,8 @@ def _check_selection(selection: Selection, view: ViewOptions, result: Result | N
         result.element(element_id)
     if selection.deformation_id:
         result.deformation(selection.deformation_id)
+    if selection.candidate_id:
+        result.candidate(selection.candidate_id)
     if selection.element_id and result.element(selection.element_id).run_id != selection.run_id:
         raise KeyError("selection")
     key = selection.profile

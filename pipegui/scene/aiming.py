@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipecore.geometry import Array, unit
-from pipecore.types import Deformation, Element, ElementKind, Profiles
+from pipecore.types import Deformation, Element, ElementKind, Profiles, SurfaceOfRevolution
 from pipegui.scene import pose as poses
 from pipegui.scene import shapes
 from pipegui.scene.pose import VIEW_ANGLE, Pose
@@ -45,12 +45,14 @@ def aim(state: SceneState, pose: Pose, aspect: float, *, stay_if_seen: bool) -> 
         return _aim_at_deformation(
             deformation, result.element(deformation.element_id), pose, aspect
         )
-    elements = tuple(
+    elements: tuple[SurfaceOfRevolution, ...] = tuple(
         e
         for e in result.elements
         if (e.element_id == selection.element_id if selection.element_id else True)
         and selection.run_id == e.run_id
     )
+    if selection.candidate_id:
+        elements = (result.candidate(selection.candidate_id),)
     if not elements:
         return None
     points = shapes.outline(elements)

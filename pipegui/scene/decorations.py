@@ -7,7 +7,7 @@ import pyvista as pv
 from PySide6.QtGui import QColor
 from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
-from pipecore.types import OWN_STACK, Element, Profiles
+from pipecore.types import OWN_STACK, Candidate, Element, Profiles
 from pipegui.model.document import ClipBox, ColourBy
 from pipegui.scene import shapes
 from pipegui.scene.colouring import (
@@ -62,6 +62,8 @@ class Decorations:
             self._replace("ellipses", self._ellipses(state))
         if selected or any(getattr(old, name) != getattr(new, name) for name in HIGHLIGHTING):
             self._replace("highlight", self._highlight(state))
+        if selected:
+            self._replace("candidate", self._candidate(state))
         is_other_stack = (old.shown_stack, old.shown_profile) != (
             new.shown_stack,
             new.shown_profile,
@@ -161,6 +163,11 @@ class Decorations:
         for each in (element, *marked):
             yield 1, _lines(shapes.end_rings(each), accent, 2.0)
 
+    def _candidate(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
+        candidate = selected_candidate(state)
+        if candidate is not None:
+            yield 1, _lines(shapes.wire(candidate), self._tint("accent"), 1.5)
+
     def _stack_profile(self, state: SceneState) -> Iterable[tuple[int, vtkActor]]:
         """Yield the one profile of a stack: its points in their colours, and its ellipses."""
         cloud, result, view = state.cloud, state.result, state.view
@@ -209,6 +216,14 @@ def selected_element(state: SceneState) -> Element | None:
     if state.result is None or not selected:
         return None
     return state.result.element(selected)
+
+
+def selected_candidate(state: SceneState) -> Candidate | None:
+    """Return the selected candidate, if there is one."""
+    selected = state.selection.candidate_id
+    if state.result is None or not selected:
+        return None
+    return state.result.candidate(selected)
 
 
 def _lines(mesh: pv.PolyData, colour: QColor, width: float, opacity: float = 1.0) -> vtkActor:

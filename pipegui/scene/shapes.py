@@ -1,16 +1,20 @@
 """Lines and surfaces of elements and profiles, many merged into one mesh. No window here."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import pyvista as pv
 
 from pipecore.geometry import Array, LineAxis, surface_points
-from pipecore.types import Element, ElementKind, Profiles
+from pipecore.types import Element, ElementKind, Profiles, SurfaceOfRevolution
 
 N_AROUND = 48
 N_ALONG_BEND = 24
+N_WIRES = 8
+"""Lines along a surface that is drawn as wires."""
 
 
-def axis_lines(elements: tuple[Element, ...]) -> pv.PolyData:
+def axis_lines(elements: Sequence[SurfaceOfRevolution]) -> pv.PolyData:
     """Return the axes of `elements`, straight or curved."""
     return _polylines([e.axis.at(_chainages(e)) for e in elements])
 
@@ -30,7 +34,7 @@ def ellipses(profiles: Profiles, n_around: int = N_AROUND) -> Array:
     return points[np.isfinite(points).all(axis=(1, 2))]
 
 
-def end_rings(element: Element) -> pv.PolyData:
+def end_rings(element: SurfaceOfRevolution) -> pv.PolyData:
     """Return the circles at both ends of an element, or a sphere's equator."""
     clock = np.linspace(0, 2 * np.pi, N_AROUND + 1)
     if element.kind is ElementKind.SPHERE:
@@ -38,6 +42,26 @@ def end_rings(element: Element) -> pv.PolyData:
         return _polylines([element.centre + element.radius * around])
     ends = (0.0, element.axis.length)
     return _polylines([surface_points(element.axis, s, element.radius_at(s), clock) for s in ends])
+
+
+def wire(surface: SurfaceOfRevolution) -> pv.PolyData:
+    """Return a surface as circles across its axis and lines along it."""
+    clock = np.linspace(0, 2 * np.pi, N_AROUND + 1)
+    if surface.kind is ElementKind.SPHERE:
+        around = surface.radius * np.stack([np.cos(clock), np.sin(clock), 0 * clock], axis=1)
+        return _polylines([surface.centre + np.roll(around, i, axis=1) for i in range(3)])
+    length = surface.axis.length
+    n_rings = int(np.clip(np.ceil(length / (2 * surface.radius)) + 1, 2, 100))
+    rings = [
+        surface_points(surface.axis, s, surface.radius_at(s), clock)
+        for s in np.linspace(0, length, n_rings)
+    ]
+    s = np.linspace(0, length, N_ALONG_BEND)
+    lines = [
+        surface_points(surface.axis, s, surface.radius_at(s), np.full(len(s), angle))
+        for angle in np.linspace(0, 2 * np.pi, N_WIRES, endpoint=False)
+    ]
+    return _polylines([*rings, *lines])
 
 
 def box_lines(low: Array, high: Array) -> pv.PolyData:
@@ -55,7 +79,7 @@ def surfaces(elements: tuple[Element, ...]) -> pv.PolyData:
     return pv.merge(meshes) if meshes else pv.PolyData()
 
 
-def outline(elements: tuple[Element, ...]) -> Array:
+def outline(elements: Sequence[SurfaceOfRevolution]) -> Array:
     """Return points around `elements` that have to be in view to see them, shape (n, 3)."""
     points = [np.empty((0, 3))]
     for e in elements:
@@ -68,7 +92,7 @@ def outline(elements: tuple[Element, ...]) -> Array:
     return np.concatenate(points)
 
 
-def _chainages(element: Element) -> Array:
+def _chainages(element: SurfaceOfRevolution) -> Array:
     n_along = 2 if isinstance(element.axis, LineAxis) else N_ALONG_BEND
     return np.linspace(0, element.axis.length, n_along)
 

@@ -18,6 +18,7 @@ from pipecore.inspection.section import radius_is_measurable
 from pipecore.rules import depth_pct_od
 from pipecore.settings import FieldSpec, Settings, choices_of, iterate_fields
 from pipecore.types import (
+    Candidate,
     Deformation,
     DeformationKind,
     Element,
@@ -28,7 +29,16 @@ from pipecore.types import (
     Verdict,
 )
 from pipegui.i18n.reason_texts import reason_text
-from pipegui.i18n.texts import count, first_capital, format_measure, label_of, mark, run_label, tr
+from pipegui.i18n.texts import (
+    candidate_label,
+    count,
+    first_capital,
+    format_measure,
+    label_of,
+    mark,
+    run_label,
+    tr,
+)
 from pipegui.model.document import Scan, Selection
 from pipegui.model.result_queries import stack_name
 from pipegui.model.view_commands import extent
@@ -140,6 +150,8 @@ def title(result: Result | None, selection: Selection) -> str:
     """Return what is selected: "Pipe 2 · dent 1"."""
     if result is None or selection == Selection():
         return ""
+    if selection.candidate_id:
+        return candidate_label(result.candidate(selection.candidate_id))
     if not selection.element_id:
         return run_label(result, selection.run_id)
     parts = [label_of(result.element(selection.element_id))]
@@ -161,6 +173,8 @@ def properties(state: PropertiesState) -> list[Property | Heading]:
     result = scan.result
     if result is None or selection == Selection():
         return list(_of_scan(scan))
+    if selection.candidate_id:
+        return list(_of_candidate(result.candidate(selection.candidate_id), result))
     if not selection.element_id:
         return list(_of_run(result, selection.run_id))
     lines: list[Property | Heading] = []
@@ -227,6 +241,35 @@ def _of_run(result: Result, run_id: int) -> Iterator[Property | Heading]:
     yield Property(tr("Sizes"), ", ".join(sizes) or tr("no nominal size within tolerance"))
     n_deformations = sum(d.element_id in ids for d in result.deformations)
     yield Property(tr("Deformations"), str(n_deformations), str(n_deformations))
+
+
+def candidates_hint(result: Result) -> str:
+    """Say what the list of candidates holds, and what it leaves out."""
+    hint = tr("Looked like part of a pipe, and why it was not taken for one.")
+    if result.n_more_candidates:
+        more = tr("{n} more, farther from acceptance, are not listed.")
+        hint += " " + more.format(n=result.n_more_candidates)
+    return hint
+
+
+def _of_candidate(candidate: Candidate, result: Result) -> Iterator[Property | Heading]:
+    yield Heading(candidate_label(candidate))
+    why = reason_text(candidate.reason)
+    yield Property(tr("Not accepted"), why, hint=why)
+    if math.isfinite(candidate.value):
+        for name, value in ((tr("Value"), candidate.value), (tr("Limit"), candidate.limit)):
+            text = f"{value:.3g} {candidate.unit}".strip()
+            yield Property(name, text, cell(value, 4))
+    yield _measure(tr("Radius"), candidate.radius, candidate.radius_sd)
+    if candidate.kind is ElementKind.CONE:
+        yield _measure(tr("Radius at end"), candidate.radius_end, candidate.radius_sd)
+    yield _measure(tr("Length"), candidate.axis.length, unit="m")
+    yield _measure(tr("Arc seen"), candidate.arc, unit="°")
+    residual = tr("Root mean square distance from the surface.")
+    yield _measure(tr("Residual"), candidate.rms, hint=residual)
+    yield Property(tr("Points"), f"{candidate.n_points:,}", str(candidate.n_points))
+    for name, point in ((tr("Start"), candidate.axis.start), (tr("End"), candidate.axis.end)):
+        yield _position(name, point + result.origin)
 
 
 def _of_element(element: Element, result: Result) -> Iterator[Property]:

@@ -36,6 +36,8 @@ CONTEXT_MENUS: dict[NodeKind, tuple[str, ...]] = {
     NodeKind.STATIONS: _OF_STATIONS,
     NodeKind.STATION: _OF_STATIONS,
     NodeKind.DEFORMATIONS: ("next_deformation", "export_deformations"),
+    NodeKind.CANDIDATES: ("dismiss_candidates",),
+    NodeKind.CANDIDATE: ("zoom", "", "accept_candidate", "dismiss_candidate"),
     NodeKind.DEFORMATION: ("zoom", "isolate", "", "answer", "", "accept", "reject", "reopen"),
 }
 """Names of actions by the kind of row; "" separates."""

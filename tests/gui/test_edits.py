@@ -1,5 +1,6 @@
 """Editing elements in a real window: tree, menus, keys, history."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,9 +8,14 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QAbstractItemModelTester
 from PySide6.QtWidgets import QApplication, QInputDialog, QLineEdit, QMenu
 
-from pipecore.types import ReviewState
+from pipecore.editing import delete_elements
+from pipecore.elements.gates import refusals
+from pipecore.reasons import Reason
+from pipecore.types import Candidate, Result, ReviewState
+from pipegui.model import selection_commands
 from pipegui.model.document import ClipBox, Scan, Selection
 from pipegui.panels.project_model import NAME, NodeKind, ProjectModel
+from pipegui.panels.widgets import items_of
 from pipegui.states.view_state import TreeState
 from tests.factories import make_scan
 
@@ -314,3 +320,80 @@ def test_that_the_model_keeps_its_promises_while_rows_come_and_go(qtbot):
     model.apply(TreeState((Scan("b", cloud), scan), 1))
     model.apply(TreeState())
     assert tester is not None
+
+
+def with_candidate(result: Result, element_id: int) -> Result:
+    """`result` without an element, which is a candidate instead."""
+    element = result.element(element_id)
+    reason = Reason(refusals.SCATTERS, value="8.0", limit="5.0")
+    candidate = Candidate(
+        1,
+        element.kind,
+        element.axis,
+        element.radius,
+        element.radius_sd,
+        element.radius_end,
+        element.arc,
+        element.rms,
+        element.n_points,
+        reason,
+        8.0,
+        5.0,
+        "mm",
+    )
+    return replace(delete_elements(result, [element_id]), candidates=(candidate,))
+
+
+class TestNotAccepted:
+    """A pipe of the scan as a candidate: its points belong to nothing yet."""
+
+    @pytest.fixture
+    def app(self, make_app, qtbot):
+        cloud, result = make_scan(MANY)
+        app = make_app(read=lambda *_: cloud, detect=lambda *_: with_candidate(result, 7))
+        app.controllers.scans.open_files([Path("plant.laz")])
+        qtbot.waitUntil(lambda: app.session.document.scan is not None)
+        app.controllers.scans.detect()
+        qtbot.waitUntil(
+            lambda: app.session.document.result is not None and not app.session.jobs.is_busy
+        )
+        return app
+
+    @staticmethod
+    def row(app):
+        return app.window.panels.tree.model.index_of(0, Selection(candidate_id=1))
+
+    def test_that_it_is_told_in_a_folded_branch_with_its_reason(self, app):
+        tree, row = app.window.panels.tree, self.row(app)
+        assert ", 1 not accepted" in app.window.panels.message.text.text()
+        assert row.parent().data() == "Not accepted (1)"
+        assert not tree.view.isExpanded(row.parent())
+        assert row.data() == "Pipe 1?"
+        assert "scatter" in row.data(Qt.ItemDataRole.ToolTipRole)
+
+    def test_that_a_click_shows_it_and_one_more_accepts_it(self, app, qtbot):
+        tree = app.window.panels.tree
+        tree.view.expand(self.row(app).parent())
+        tree.view.scrollTo(self.row(app))
+        place = tree.view.visualRect(self.row(app)).center()
+        qtbot.mouseClick(tree.view.viewport(), LEFT, pos=place)
+        assert app.window.views.scene.state.selection.candidate_id == 1
+        listed = items_of(app.window.panels.properties.list)
+        lines = {item.text(0): item.text(1) for item in listed}
+        assert lines["Value"] == "8 mm"
+        assert lines["Limit"] == "5 mm"
+        app.window.actions_["accept_candidate"].trigger()
+        qtbot.waitUntil(lambda: not app.session.document.result.candidates)
+        element = app.session.document.result.element(app.session.document.selection.element_id)
+        assert element.accepted_by == "person"
+        assert element.radius == pytest.approx(make_scan(MANY)[1].element(7).radius, rel=0.002)
+        app.window.actions_["undo"].trigger()
+        assert len(app.session.document.result.candidates) == 1
+
+    def test_that_dismissing_takes_the_branch_away_until_undone(self, app):
+        app.session.do(selection_commands.select_candidate, 1)
+        app.window.actions_["dismiss_candidate"].trigger()
+        assert not self.row(app).isValid()
+        assert app.session.document.selection == Selection()
+        app.window.actions_["undo"].trigger()
+        assert self.row(app).isValid()

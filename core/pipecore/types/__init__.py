@@ -15,7 +15,13 @@ from pipecore.types.deformation import (
     ReviewState,
     SeenBy,
 )
-from pipecore.types.element import KIND_LABELS, Element, ElementKind, NominalSize
+from pipecore.types.element import (
+    KIND_LABELS,
+    Element,
+    ElementKind,
+    NominalSize,
+    SurfaceOfRevolution,
+)
 from pipecore.types.ids import NO_ID
 from pipecore.types.judgement import Answers, Condition, Question, Verdict
 from pipecore.types.profiles import Profiles
@@ -47,5 +53,6 @@ __all__ = [
     "SeenBy",
     "Stack",
     "Storage",
+    "SurfaceOfRevolution",
     "Verdict",
 ]

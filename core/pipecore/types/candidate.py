@@ -7,7 +7,7 @@ import numpy as np
 from pipecore.geometry import AnyAxis
 from pipecore.reasons import Reason
 from pipecore.types.arrays import Array
-from pipecore.types.element import KIND_LABELS, ElementKind
+from pipecore.types.element import KIND_LABELS, ElementKind, radius_along
 
 
 def _no_centre() -> Array:
@@ -63,3 +63,18 @@ class Candidate:
     def label(self) -> str:
         """What people call it, such as "Pipe?" with its number."""
         return f"{KIND_LABELS[self.kind]} {self.candidate_id}?"
+
+    def radius_at(self, chainage: Array | float) -> Array:
+        """Radius of the fitted surface about the axis at `chainage`, metres.
+
+        Parameters
+        ----------
+        chainage : array_like
+            Metres.
+
+        Returns
+        -------
+        ndarray
+            Shape as of `chainage`.
+        """
+        return radius_along(self, chainage)

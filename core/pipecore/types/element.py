@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 
@@ -168,9 +169,52 @@ class Element(Summarised):
         ndarray
             Shape as of `chainage`.
         """
-        s = np.asarray(chainage, dtype=np.float64)
-        if self.kind is ElementKind.SPHERE:
-            along = (self.centre - self.axis.start) @ self.axis.tangent(0.0)
-            return np.sqrt(np.maximum(self.radius**2 - (s - along) ** 2, 0.0))
-        slope = (self.radius_end - self.radius) / self.axis.length
-        return np.asarray(self.radius + slope * s)
+        return radius_along(self, chainage)
+
+
+class SurfaceOfRevolution(Protocol):
+    """What elements and candidates have in common: a radius along an axis."""
+
+    @property
+    def kind(self) -> ElementKind:
+        """What it is."""
+
+    @property
+    def axis(self) -> AnyAxis:
+        """As far as the surface goes."""
+
+    @property
+    def radius(self) -> float:
+        """At the start of the axis, metres."""
+
+    @property
+    def radius_end(self) -> float:
+        """At its end, metres."""
+
+    @property
+    def centre(self) -> Array:
+        """Of a sphere or a bend, shape (3,)."""
+
+    def radius_at(self, chainage: Array | float, /) -> Array:
+        """Radius at `chainage`, metres.
+
+        Parameters
+        ----------
+        chainage : array_like
+            Along the axis, metres.
+
+        Returns
+        -------
+        ndarray
+            Shape as of `chainage`.
+        """
+
+
+def radius_along(surface: SurfaceOfRevolution, chainage: Array | float) -> Array:
+    """Radius about the axis at `chainage`, metres, of an element or a candidate."""
+    s = np.asarray(chainage, dtype=np.float64)
+    if surface.kind is ElementKind.SPHERE:
+        along = (surface.centre - surface.axis.start) @ surface.axis.tangent(0.0)
+        return np.sqrt(np.maximum(surface.radius**2 - (s - along) ** 2, 0.0))
+    slope = (surface.radius_end - surface.radius) / surface.axis.length
+    return np.asarray(surface.radius + slope * s)
