@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 from pipecore import detect, load
 from pipecore.editing import split_element
-from pipecore.elements.refinement.curved_fit import straightened
+from pipecore.elements.refinement.curved_fit import curve_through, straightened
 from pipecore.geometry import Array, CurveAxis, LineAxis, surface_points
 from pipecore.report import write_report
 from pipecore.types import DeformationKind, Element, ElementKind, PointCloud, Result
@@ -158,3 +158,14 @@ def test_that_points_about_a_curve_made_straight_lie_about_its_chord(rng):
     assert_allclose(distance, 0.05, atol=1e-9)
     assert_allclose(chainage, s / axis.length * axis.chord.length, atol=1e-9)
     assert_allclose(np.exp(1j * angle), np.exp(1j * clock), atol=1e-9)
+
+
+def test_that_places_that_turn_back_make_no_axis():
+    there = np.linspace([0.0, 0.0, 0.0], [1.0, 0.1, 0.0], 9)
+    axis = curve_through(there, 4)
+    assert axis is not None
+    assert axis.length == pytest.approx(np.hypot(1.0, 0.1))
+    back = there.copy()
+    back[5] = back[3]
+    assert curve_through(back, 4) is None
+    assert curve_through(there[:1].repeat(9, axis=0), 4) is None

@@ -81,7 +81,10 @@ def fit_curved_pipe(
     """
     weight = np.array([p.axis.length for p in parts])
     radius = float(np.average([p.fit.model.radius for p in parts], weights=weight))
-    axis = _first_axis([p.axis for p in parts], radius)
+    first = _first_axis([p.axis for p in parts], radius)
+    if first is None:
+        return None
+    axis = first
     sigma = max(MIN_SIGMA_M, *(p.fit.sigma for p in parts))
     band = max(FIRST_BAND_RADII * radius, band_of(sigma))
     before, grows = axis, [True, True]
@@ -109,7 +112,10 @@ def fit_curved_pipe(
         low = extent.low if grows[0] else max(extent.low, 0.0)
         high = extent.high if grows[1] else min(extent.high, axis.length)
         grown = max(abs(low), abs(high - axis.length))
-        axis = _between(axis, low, high, radius)
+        part = _between(axis, low, high, radius)
+        if part is None:
+            return None
+        axis = part
         if grown < HELD_RADII * radius:
             break
     return _finished(axis, radius, sigma, nearby, is_free)
@@ -203,7 +209,24 @@ def _n_pieces(length: float, radius: float) -> int:
     return int(np.clip(round(length / (PIECE_RADII * radius)), FEWEST_PIECES, MOST_PIECES))
 
 
-def _first_axis(axes: Sequence[AnyAxis], radius: float) -> CurveAxis:
+def curve_through(places: Array, n_pieces: int) -> CurveAxis | None:
+    """Return the axis through places; None where they turn back, as no bowed pipe does.
+
+    Parameters
+    ----------
+    places : ndarray, shape (m, 3)
+    n_pieces : int
+
+    Returns
+    -------
+    CurveAxis or None
+    """
+    if not (np.diff(places @ (places[-1] - places[0])) > 0.0).all():
+        return None
+    return CurveAxis.through(places, n_pieces)
+
+
+def _first_axis(axes: Sequence[AnyAxis], radius: float) -> CurveAxis | None:
     """A smooth curve along the axes of pieces."""
     samples = np.concatenate([a.at(np.linspace(0.0, a.length, 12)) for a in axes])
     middle = samples.mean(axis=0)
@@ -220,13 +243,13 @@ def _first_axis(axes: Sequence[AnyAxis], radius: float) -> CurveAxis:
         rcond=None,
     )
     places = middle + knots[:, None] * direction + off
-    return CurveAxis.through(places, len(knots) - 1)
+    return curve_through(places, len(knots) - 1)
 
 
-def _between(axis: CurveAxis, low: float, high: float, radius: float) -> CurveAxis:
+def _between(axis: CurveAxis, low: float, high: float, radius: float) -> CurveAxis | None:
     """The axis between two chainages, in pieces of the usual length."""
     n = _n_pieces(high - low, radius)
-    return CurveAxis.through(axis.at(np.linspace(low, high, 8 * n + 1)), n)
+    return curve_through(axis.at(np.linspace(low, high, 8 * n + 1)), n)
 
 
 def _points_about(
@@ -298,7 +321,8 @@ def _moved(
     places = axis.at(knots) + to_up * up + to_right * right
     if not np.isfinite(places).all() or abs(solution[0]) > FIRST_BAND_RADII * radius:
         return None
-    return CurveAxis.through(places, n - 1), radius + float(solution[0]), float(scatter)
+    curve = curve_through(places, n - 1)
+    return None if curve is None else (curve, radius + float(solution[0]), float(scatter))
 
 
 def _arc(clock: Array) -> float:
