@@ -25,7 +25,7 @@ from pipecore.surface import (
     median_spacing,
     sample_surface,
 )
-from pipecore.surface.downsampling import SMALLEST_VOXEL, average_voxels
+from pipecore.surface.downsampling import automatic_voxel, average_voxels
 from pipecore.types import PointCloud, Stack
 
 Array = NDArray[np.float64]
@@ -186,7 +186,7 @@ def _surface_of_sample(
     xyz = cloud.xyz[index]
     is_all = len(index) == len(cloud)
     spacing = median_spacing(xyz, among=None if is_all else _is_well_inside(xyz))
-    voxel = settings.thinning.voxel_mm / 1e3 or max(spacing, SMALLEST_VOXEL)
+    voxel = settings.thinning.voxel_mm / 1e3 or automatic_voxel(spacing, cloud.step)
     downsampled = average_voxels(xyz, voxel, progress)
     normals, residuals, distances = fit_planes(downsampled.xyz, voxel, progress)
     is_whole = np.full(len(normals), is_all) | _is_well_inside(downsampled.xyz)

@@ -16,7 +16,7 @@ from pipecore.deformation.contour import (
     usable_arc,
 )
 from pipecore.deformation.criteria import ProfileCriteria
-from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid
+from pipecore.deformation.deviation_map import DeviationMap, Flags, Grid, box_sum
 from pipecore.deformation.element_surface import ElementSurface, find_element_surface
 from pipecore.deformation.free_sections import FreeSections
 from pipecore.deformation.hidden_ovality import (
@@ -48,6 +48,7 @@ from pipecore.deformation.records import (
 from pipecore.deformation.unrolled_points import UnrolledPoints, surface_distance, unroll
 from pipecore.geometry import ArcAxis, Array, surface_points
 from pipecore.reasons import Reason
+from pipecore.rounding import NO_ROUNDING, Rounding
 from pipecore.settings import DeformationSettings
 from pipecore.types import Deformation, DeformationKind, Element, ElementKind
 
@@ -117,6 +118,7 @@ def find_deformations(
     normals: Array,
     neighbours: Sequence[Element],
     settings: DeformationSettings,
+    rounding: Rounding = NO_ROUNDING,
 ) -> DeformationFinding:
     """Find and measure the deformations of one element.
 
@@ -129,6 +131,8 @@ def find_deformations(
     neighbours : sequence of Element
         Elements whose surfaces come near: where they touch, nothing is called a bulge.
     settings : DeformationSettings
+    rounding : Rounding
+        Of the points' coordinates.
 
     Returns
     -------
@@ -145,7 +149,7 @@ def find_deformations(
             None,
             not_measurable=dict.fromkeys(_applicable(element), Reason("too few points")),
         )
-    heights = _height_map(element, surface, neighbours)
+    heights = _height_map(element, surface, neighbours, rounding)
     arc = usable_arc(surface.grid, heights.covered)
     n_terms = 5 if arc >= MIN_ARC else 3
 
@@ -296,23 +300,30 @@ def _mean_ovality(contour: Contour, arc: float) -> tuple[float, float, Reason]:
 
 
 def _height_map(
-    element: Element, surface: ElementSurface, neighbours: Sequence[Element]
+    element: Element, surface: ElementSurface, neighbours: Sequence[Element], rounding: Rounding
 ) -> DeviationMap:
     """Cell means above the fitted surface, with the cells where others touch it."""
     grid, inliers = surface.grid, surface.belongs
     cell = surface.cell[inliers]
     count = grid.count(cell)
     in_contact = surface.overlain.copy()
+    chainage, clock = (a.ravel() for a in np.meshgrid(grid.chainages, grid.clocks, indexing="ij"))
+    places = surface_points(element.axis, chainage, element.radius_at(chainage), clock)
+    noise = surface.noise
+    if rounding.step:
+        along = element.axis.tangent(chainage)
+        normal = places - element.axis.at(chainage)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-9)[:, None]
+        density = box_sum(count) / (9 * grid.row_size * grid.column_size)
+        frame = normal, along, np.cross(along, normal)
+        noise = rounding.point_sd(noise.ravel(), frame, density.ravel(), grid.radius)
+        noise = noise.reshape(grid.shape)
     if neighbours:
-        chainage, clock = (
-            a.ravel() for a in np.meshgrid(grid.chainages, grid.clocks, indexing="ij")
-        )
-        places = surface_points(element.axis, chainage, element.radius_at(chainage), clock)
         reach = max(2 * grid.row_size, 0.01)
         for other in neighbours:
             in_contact |= (surface_distance(other, places) < reach).reshape(grid.shape)
     return DeviationMap(
-        grid, grid.mean(cell, surface.points.height[inliers]), surface.noise, count, in_contact
+        grid, grid.mean(cell, surface.points.height[inliers]), noise, count, in_contact
     )
 
 

@@ -18,8 +18,10 @@ from pipecore.elements.runs.joining import join_straights
 from pipecore.elements.runs.numbering import number_runs
 from pipecore.elements.runs.trimming import trim_to_each_other, trim_to_fitting
 from pipecore.elements.selection import select_elements
+from pipecore.ellipses import radius_sd_factor
 from pipecore.geometry import AnyAxis
 from pipecore.progress import Progress
+from pipecore.rounding import Rounding
 from pipecore.settings import ElementSettings
 from pipecore.types import Candidate, Element, ElementKind
 
@@ -92,7 +94,7 @@ def build_elements(
         elif _is_alone(part, run) and kind is ElementKind.CYLINDER:
             least = _least_lone_length(part, settings)
             not_accepted.add_dropped(part.found, too_short(part.axis.length, least))
-    return _number_elements(reported, settings), *not_accepted.candidates()
+    return _number_elements(reported, settings, nearby.rounding), *not_accepted.candidates()
 
 
 def _spans(axes: list[AnyAxis], fitted: list[FittedElement]) -> list[AxisSpan]:
@@ -184,7 +186,9 @@ def _is_clear_cone(part: ElementPart) -> bool:
 
 
 def _number_elements(
-    parts: list[tuple[ElementPart, ElementKind, int]], settings: ElementSettings
+    parts: list[tuple[ElementPart, ElementKind, int]],
+    settings: ElementSettings,
+    rounding: Rounding,
 ) -> tuple[Element, ...]:
     """Elements in their final order: the longest run first, along each run."""
     if not parts:
@@ -199,24 +203,30 @@ def _number_elements(
     elements: list[Element] = []
     for part, kind, run in sorted(parts, key=place):
         run_id.setdefault(run, len(run_id) + 1)
-        elements.append(_element(part, kind, len(elements) + 1, run_id[run], settings))
+        element = _element(part, kind, len(elements) + 1, run_id[run], rounding)
+        elements.append(with_sizes(element, settings))
     return tuple(elements)
 
 
 def _element(
-    part: ElementPart, kind: ElementKind, element_id: int, run_id: int, settings: ElementSettings
+    part: ElementPart, kind: ElementKind, element_id: int, run_id: int, rounding: Rounding
 ) -> Element:
     found = part.found
     model = found.fit.model
     start_radius, end_radius = replace(found, axis=part.axis).radii
     shift = float(found.axis.pipe_coordinates(part.axis.start[None])[0][0])
-    element = Element(
+    length = part.axis.length
+    by_rounding = rounding.radius_sd(
+        model.radius, part.axis.tangent(length / 2), length, found.fit.sigma
+    )
+    by_rounding *= float(radius_sd_factor(found.extent.arc) * np.sqrt(2 * np.pi / found.extent.arc))
+    return Element(
         element_id=element_id,
         run_id=run_id,
         kind=kind,
         axis=part.axis,
         radius=start_radius,
-        radius_sd=found.radius_sd,
+        radius_sd=float(np.hypot(found.radius_sd, by_rounding)),
         radius_end=end_radius,
         centre=np.full(3, np.nan) if isinstance(model, LineSurface) else model.centre,
         n_points=0,
@@ -225,4 +235,3 @@ def _element(
         rms=found.fit.sigma,
         gaps=tuple((a - shift, b - shift) for a, b in found.extent.gaps),
     )
-    return with_sizes(element, settings)

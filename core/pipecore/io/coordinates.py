@@ -221,7 +221,7 @@ def _sampled(xyz: Array) -> Array:
 def notes_on_steps(
     path: Path, source: Source, xyz: Array, unit: FileUnit
 ) -> tuple[tuple[Note, ...], float]:
-    """Return a note on coarse coordinates, and their steps in metres; () and 0 if they are fine.
+    """Return a note on coarse coordinates, and their steps in metres.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def notes_on_steps(
         if of_float32 >= max(step, COARSE_STEP):
             return (_float32_note(path, of_float32),), of_float32
     if not step >= COARSE_STEP * (1 - 1e-6):
-        return (), 0.0
+        return (), step
     return (
         Note(
             "Coordinates of “{name}” are rounded to {step:.3g} mm, which adds an uncertainty of "

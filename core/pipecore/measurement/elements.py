@@ -164,7 +164,9 @@ def _measure(
     radius = max(element.radius, element.radius_end)
     downsampled = nearby.around_axis(element.axis, radius, 0.5 * radius, DEEPEST)
     index, xyz, normals = nearby.full_resolution_with_normals(downsampled)
-    finding = find_deformations(element, xyz, normals, neighbours, options.deformations)
+    finding = find_deformations(
+        element, xyz, normals, neighbours, options.deformations, nearby.rounding
+    )
     check()
     own = finding.points[finding.belongs]
     places = own.chainage, own.distance, own.clock

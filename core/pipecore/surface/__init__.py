@@ -12,6 +12,7 @@ from pipecore.settings import ThinningSettings
 from pipecore.surface.downsampling import (
     SMALLEST_VOXEL,
     DownsampledCloud,
+    automatic_voxel,
     average_voxels,
     downsample,
 )
@@ -27,6 +28,7 @@ __all__ = [
     "DownsampledCloud",
     "Order",
     "Surface",
+    "automatic_voxel",
     "average_voxels",
     "cells_of",
     "downsample",

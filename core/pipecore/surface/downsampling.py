@@ -16,6 +16,8 @@ from pipecore.types import PointCloud
 
 SMALLEST_VOXEL = 0.003
 """Thinning finer than 3 mm keeps noise, not shape."""
+VOXEL_STEPS = 2.0
+"""Rounded coordinates hold no shape smaller than this, in their steps."""
 CHUNK = 500_000
 
 
@@ -58,10 +60,27 @@ def downsample(
     DownsampledCloud
     """
     progress.update("thinning", 0.0)
-    edge = settings.voxel_mm / 1e3 or max(
-        median_spacing(cloud.xyz, progress=progress), SMALLEST_VOXEL
+    edge = settings.voxel_mm / 1e3 or automatic_voxel(
+        median_spacing(cloud.xyz, progress=progress), cloud.step
     )
     return average_voxels(cloud.xyz, edge, progress)
+
+
+def automatic_voxel(spacing: float, step: float) -> float:
+    """Return the edge of voxels where the setting is automatic, metres.
+
+    Parameters
+    ----------
+    spacing : float
+        Median distance between neighbouring points, metres.
+    step : float
+        Steps of the coordinates, metres.
+
+    Returns
+    -------
+    float
+    """
+    return max(spacing, SMALLEST_VOXEL, VOXEL_STEPS * step)
 
 
 def average_voxels(

@@ -14,9 +14,9 @@ from pipecore.progress import Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface import (
     NOISE_QUANTILE,
-    SMALLEST_VOXEL,
     WIDEST_NEIGHBOURHOOD,
     Surface,
+    automatic_voxel,
     average_voxels,
     cells_of,
     fit_planes,
@@ -95,6 +95,7 @@ def downsample_in_slabs(
     engine: Engine,
     n_points: int,
     settings: ThinningSettings,
+    step: float,
     slab_bytes: int,
     progress: Progress,
 ) -> TiledSurface:
@@ -108,6 +109,8 @@ def downsample_in_slabs(
     engine : Engine
     n_points : int
     settings : ThinningSettings
+    step : float
+        Steps of the coordinates, metres.
     slab_bytes : int
         Memory that one slab may take.
     progress : Progress
@@ -118,7 +121,7 @@ def downsample_in_slabs(
     if not edge:
         # It looks at the points in passing, chunk by chunk.
         xyz = store.open_coordinates()
-        edge = max(median_spacing(xyz, progress=progress), SMALLEST_VOXEL)
+        edge = automatic_voxel(median_spacing(xyz, progress=progress), step)
     counted = engine.run(count_planes, [(p, edge) for p in parts], "thinning", progress, (0.3, 0.4))
     planes, which = np.unique(np.concatenate([p for p, _ in counted]), return_inverse=True)
     counts = np.zeros(len(planes), np.int64)

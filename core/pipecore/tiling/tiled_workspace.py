@@ -37,7 +37,12 @@ class InTiles:
     def sample_surface(self, settings: ThinningSettings, progress: Progress) -> Surface:
         """See `Workspace`."""
         self._tiled = downsample_in_slabs(
-            self._engine, len(self.cloud), settings, self._slab_bytes, progress
+            self._engine,
+            len(self.cloud),
+            settings,
+            self.cloud.step,
+            self._slab_bytes,
+            progress,
         )
         return self._tiled.surface
 

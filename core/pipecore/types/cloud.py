@@ -130,8 +130,8 @@ class PointCloud(Summarised):
     unit : FileUnit
         Unit of the coordinates in the file.
     step : float
-        Steps in which the file keeps coordinates, metres, where they are coarse (rounding
-        adds an SD of step/√12 to each); 0 where they are fine.
+        Steps in which the file keeps coordinates, metres (rounding adds an SD of step/√12
+        to each); 0 where there are none.
     fields : mapping of str to Field
         More values of each point, as the file has them, where `read` was asked for them.
     notes : tuple of Note

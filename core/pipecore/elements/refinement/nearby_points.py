@@ -14,6 +14,7 @@ from pipecore.elements.refinement.section_model import SectionModel
 from pipecore.elements.refinement.surface_fits import LineSurface, SphereSurface, SurfaceModel
 from pipecore.geometry import Axis
 from pipecore.progress import NoProgress, Progress
+from pipecore.rounding import Rounding
 from pipecore.surface import Surface
 from pipecore.surface.grid import GridFrame, VoxelCounter, table_of
 from pipecore.types import PointCloud
@@ -112,6 +113,7 @@ class NearbyPoints:
     ) -> None:
         self._cloud = cloud
         self.surface = surface
+        self.rounding = Rounding(cloud.step)
         self._members, self._starts = surface.full_resolution_points
         edge = CELL_VOXELS * surface.voxel
         frame = GridFrame.of(surface.xyz, edge)
