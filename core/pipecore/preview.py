@@ -22,7 +22,6 @@ from pipecore.surface import (
     WIDEST_NEIGHBOURHOOD,
     Surface,
     fit_planes,
-    median_spacing,
     sample_surface,
 )
 from pipecore.surface.downsampling import automatic_voxel, average_voxels
@@ -185,8 +184,8 @@ def _surface_of_sample(
     index = _sample(cloud, progress)
     xyz = cloud.xyz[index]
     is_all = len(index) == len(cloud)
-    spacing = median_spacing(xyz, among=None if is_all else _is_well_inside(xyz))
-    voxel = settings.thinning.voxel_mm / 1e3 or automatic_voxel(spacing, cloud.step)
+    inside = None if is_all else _is_well_inside(xyz)
+    voxel = settings.thinning.voxel_mm / 1e3 or automatic_voxel(xyz, cloud.step, inside)
     downsampled = average_voxels(xyz, voxel, progress)
     normals, residuals, distances = fit_planes(downsampled.xyz, voxel, progress)
     is_whole = np.full(len(normals), is_all) | _is_well_inside(downsampled.xyz)

@@ -79,7 +79,7 @@ def fit_shape(
     axis = axis_through(fit.model, np.stack([element.axis.start, element.axis.end]))
     residual, _, _ = fit.model.residuals(xyz)
     _, _, clock = axis.pipe_coordinates(xyz)
-    misfit = section_misfit(clock, residual, element.arc)
+    misfit = section_misfit(clock, residual, element.arc, nearby.rounding)
     n_sectors = max(element.arc / (2 * np.pi) * MAX_SECTORS, 1.0)
     by_noise = 0.5 * np.pi * fit.sigma**2 * n_sectors / max(len(xyz), 1)
     excess = max(misfit**2 - by_noise, 0.0)

@@ -10,6 +10,7 @@ from pipecore.errors import ReadError
 from pipecore.io.crs import ReferenceSystem
 from pipecore.io.source import Source
 from pipecore.notes import Note
+from pipecore.rounding import measured_step, sampled_runs
 from pipecore.settings import LengthUnit
 from pipecore.types import Array
 from pipecore.units import FileUnit
@@ -23,10 +24,6 @@ UNIT_LABELS = {
 }
 COARSE_STEP = 0.002
 """Steps from which on rounding is worth a word, metres: it adds an SD of 0.6 mm."""
-STEP_SAMPLE, STEP_RUN = 5_000, 250
-"""About so many points show the steps of coordinates, so many of them consecutive."""
-FEWEST_GAPS = 8
-"""Fewer different values may be multiples of a step by chance."""
 WIDEST_SPACING, WIDEST_UNNAMED, NARROWEST_SPACING = 0.5, 0.2, 2e-5
 """Points of a scan of pipes are no further (the second, where no reference system names the unit),
 and no nearer than this, metres."""
@@ -182,42 +179,6 @@ def _looks_like_degrees(low: Array, high: Array) -> bool:
     return bool(is_bounded and 0 < plan < WIDEST_DEGREES and extent[2] > STEEPEST * plan)
 
 
-def measured_step(xyz: Array) -> float:
-    """Step in which all three coordinates are kept, in their own unit; 0 where none shows.
-
-    A regular grid has steps too, but not in all of its coordinates.
-
-    Parameters
-    ----------
-    xyz : ndarray
-        Some points, shape (m, 3), float64.
-    """
-    return min(_step_along(xyz[:, axis]) for axis in range(3))
-
-
-def _step_along(values: Array) -> float:
-    unique = np.unique(values)
-    gaps = np.diff(unique)
-    if len(gaps) < FEWEST_GAPS or len(unique) > 0.9 * len(values):
-        return 0.0
-    step = float(gaps.min())
-    if step * 2.0**53 < gaps.max():
-        return 0.0
-    # Values that are multiples of a step, but for the rounding of float64 itself.
-    rest = np.abs(gaps / step - np.round(gaps / step))
-    slack = 4 * np.spacing(np.abs(unique).max()) / step + 1e-6
-    return step if rest.max() <= 0.05 + slack else 0.0
-
-
-def _sampled(xyz: Array) -> Array:
-    """Some runs of consecutive points, evenly spread."""
-    n_runs = STEP_SAMPLE // STEP_RUN
-    if len(xyz) <= STEP_SAMPLE:
-        return xyz
-    starts = np.linspace(0, len(xyz) - STEP_RUN, n_runs).astype(int)
-    return np.asarray(xyz[(starts[:, None] + np.arange(STEP_RUN)).ravel()])
-
-
 def notes_on_steps(
     path: Path, source: Source, xyz: Array, unit: FileUnit
 ) -> tuple[tuple[Note, ...], float]:
@@ -231,7 +192,7 @@ def notes_on_steps(
         Points of the file in its unit, shape (m, 3), float64.
     unit : FileUnit
     """
-    sample = _sampled(xyz)
+    sample = sampled_runs(xyz)
     step = float((max(source.step, measured_step(sample)) * unit.factors).max())
     if not source.step and (sample == sample.astype(np.float32)).all():
         of_float32 = float((float32_steps(sample) * unit.factors).max())

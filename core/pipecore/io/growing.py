@@ -19,6 +19,7 @@ from pipecore.io.stations import StationTable
 from pipecore.io.storage import common_storage
 from pipecore.local_frame import FLOAT32_REACH, choose_origin
 from pipecore.notes import Note
+from pipecore.rounding import STEP_SAMPLE
 from pipecore.settings import StationSource
 from pipecore.types import Array, Field, PointCloud
 from pipecore.units import FileUnit
@@ -377,7 +378,7 @@ def odd_size_notes(
     if 5 * coordinates.NARROWEST_SPACING < spacing < coordinates.WIDEST_UNNAMED / 5:
         spacing = float("nan")  # a rough one is enough, since it is not odd
     else:
-        sample = cloud.xyz[: 5 * coordinates.STEP_SAMPLE].astype(np.float64)
+        sample = cloud.xyz[: 5 * STEP_SAMPLE].astype(np.float64)
         spacing = median_spacing(sample)
     return coordinates.sense_notes(
         path, cloud.unit, cloud.crs, spacing, bounds[0], bounds[1], is_angular=is_angular

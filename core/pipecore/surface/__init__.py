@@ -10,6 +10,7 @@ from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.downsampling import (
+    NEIGHBOURHOOD,
     SMALLEST_VOXEL,
     DownsampledCloud,
     automatic_voxel,
@@ -40,10 +41,8 @@ __all__ = [
     "sample_surface",
 ]
 
-NEIGHBOURHOOD = 2.8
-"""Radius of the neighbourhood of a normal, in voxels …"""
 WIDEST_NEIGHBOURHOOD = 4 * NEIGHBOURHOOD
-"""… and where there are few points."""
+"""Where there are few points, a normal's neighbourhood reaches so far, in voxels."""
 NOISE_QUANTILE = 0.25
 """Of the distances from the planes: edges and corners do not count as noise."""
 

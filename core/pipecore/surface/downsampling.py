@@ -11,9 +11,11 @@ from pipecore.progress import NoProgress, Progress
 from pipecore.settings import ThinningSettings
 from pipecore.surface.grid import GridFrame
 from pipecore.surface.sorting import Order, sort_into_cells
-from pipecore.surface.spacing import median_spacing
+from pipecore.surface.spacing import median_spacing, widen_over_rows
 from pipecore.types import PointCloud
 
+NEIGHBOURHOOD = 2.8
+"""Radius of the neighbourhood of a normal, in voxels."""
 SMALLEST_VOXEL = 0.003
 """Thinning finer than 3 mm keeps noise, not shape."""
 VOXEL_STEPS = 2.0
@@ -60,27 +62,43 @@ def downsample(
     DownsampledCloud
     """
     progress.update("thinning", 0.0)
-    edge = settings.voxel_mm / 1e3 or automatic_voxel(
-        median_spacing(cloud.xyz, progress=progress), cloud.step
-    )
+    edge = settings.voxel_mm / 1e3 or automatic_voxel(cloud.xyz, cloud.step, progress=progress)
     return average_voxels(cloud.xyz, edge, progress)
 
 
-def automatic_voxel(spacing: float, step: float) -> float:
-    """Return the edge of voxels where the setting is automatic, metres.
+def automatic_voxel(
+    xyz: NDArray[np.floating],
+    step: float,
+    among: NDArray[np.bool_] | None = None,
+    progress: Progress = NoProgress(),
+) -> float:
+    """Return the edge of voxels where the setting is automatic.
+
+    It is the median spacing of the points, or larger: so that the neighbourhood of a normal
+    holds more than one row of points, and no less than the coordinates' steps can show.
 
     Parameters
     ----------
-    spacing : float
-        Median distance between neighbouring points, metres.
+    xyz : ndarray, shape (n, 3)
+        Local coordinates, metres.
     step : float
         Steps of the coordinates, metres.
+    among : ndarray of bool, shape (n,), optional
+        Points that have all their neighbours, where others lack some.
+    progress : Progress
 
     Returns
     -------
     float
+        Metres.
     """
-    return max(spacing, SMALLEST_VOXEL, VOXEL_STEPS * step)
+    spacing = median_spacing(xyz, among=among, progress=progress)
+    least = max(spacing, SMALLEST_VOXEL, VOXEL_STEPS * step)
+    if len(xyz) < 2:
+        return least
+    reach = NEIGHBOURHOOD * least
+    wide = widen_over_rows(xyz, reach, progress)
+    return least if wide == reach else wide / NEIGHBOURHOOD
 
 
 def average_voxels(

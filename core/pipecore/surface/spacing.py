@@ -1,11 +1,14 @@
 """How far apart the points of a cloud usually are."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from pipecore._kernels import nearest_neighbours as kernels
 from pipecore._kernels.grouping import group_by_label
+from pipecore._kernels.voxel_hash import HashTable
 from pipecore.parallel import for_chunks
 from pipecore.progress import NoProgress, Progress
 from pipecore.surface.grid import GridFrame, bounds, table_of
@@ -13,6 +16,13 @@ from pipecore.surface.grid import GridFrame, bounds, table_of
 CHUNK = 1_000_000
 WIDEST_GRID = 2.0**20
 """Cells along the longest side of a grid at most."""
+N_ROW_SAMPLE = 256
+"""Points whose neighbourhoods are looked at for rows."""
+ROW_FLATNESS, FEWEST_ON_ROW = 0.2, 5
+"""A neighbourhood is a row if it is this much narrower than long, and known from so many points."""
+ROW_GROWTH, WIDEST_ROWS = 1.25, 12.0
+"""Factor from one reach that is tried to the next, and the widest: rows are further apart than
+points in them, but not so far that no pipe is round between them."""
 
 
 def median_spacing(
@@ -51,6 +61,51 @@ def median_spacing(
     n_neighbours = min(n_neighbours, len(xyz) - 1)
     reach = _reach_of_neighbours(xyz, sample, n_neighbours + 1, progress)
     return float(np.median(reach) * np.sqrt(np.pi / (n_neighbours + 1)))
+
+
+def widen_over_rows(
+    xyz: NDArray[np.floating], reach: float, progress: Progress = NoProgress()
+) -> float:
+    """Return a reach within which most points see more than one row of points.
+
+    Scanners that turn slowly, and those of vehicles, leave rows far wider apart than the
+    points in a row: a neighbourhood on one row alone has no normal.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Metres.
+    reach : float
+        Of a neighbourhood, metres; the least that is returned.
+    progress : Progress
+
+    Returns
+    -------
+    float
+        Metres; `reach` where that will do, or where nothing up to `WIDEST_ROWS` times does.
+    """
+    sample = np.asarray(xyz[sample_by_place(xyz, min(N_ROW_SAMPLE, len(xyz)), progress)], float)
+    low, high = bounds(xyz)
+    wide = reach
+    while wide <= WIDEST_ROWS * reach:
+        frame = GridFrame.around(low, high, max(wide, float((high - low).max()) / WIDEST_GRID))
+        near = _around_cells(xyz, sample, frame, progress).points
+        if not _is_on_rows(near, sample, wide):
+            return wide
+        wide *= ROW_GROWTH
+    return reach
+
+
+def _is_on_rows(near: NDArray[np.float64], sample: NDArray[np.float64], reach: float) -> bool:
+    """Whether most points see nothing but a row within reach."""
+    n_on_rows, n_known = 0, 0
+    for place, index in zip(sample, cKDTree(near).query_ball_point(sample, reach), strict=True):
+        if len(index) >= FEWEST_ON_ROW:
+            off = near[index] - place
+            _, second, largest = np.linalg.eigvalsh(np.cov(off.T))
+            n_on_rows += bool(second < ROW_FLATNESS**2 * largest)
+            n_known += 1
+    return n_on_rows > 0.5 * n_known
 
 
 def sample_by_place(
@@ -103,14 +158,21 @@ def _reach_of_neighbours(
         edge *= 2.0
 
 
-def _within_cells(
+class _Around(NamedTuple):
+    """Points (m, 3) in the cells around samples, by cell; the cells' table; where each begins."""
+
+    points: NDArray[np.float64]
+    table: HashTable
+    starts: NDArray[np.integer]
+
+
+def _around_cells(
     xyz: NDArray[np.floating],
     sample: NDArray[np.float64],
-    k: int,
     frame: GridFrame,
     progress: Progress,
-) -> NDArray[np.float64]:
-    """Distance of each sample to its `k` nearest points; nan where beyond a cell's edge."""
+) -> _Around:
+    """Return the points in the cells of the samples and in those beside them."""
     steps = np.arange(-1, 2)
     around = (
         (steps[:, None, None] * frame.n_y + steps[:, None]) * frame.n_z + steps
@@ -128,9 +190,20 @@ def _within_cells(
     points = np.concatenate([collected[start][0] for start in sorted(collected)])
     cells = np.concatenate([collected[start][1] for start in sorted(collected)])
     order, starts = group_by_label(cells, len(marked))
-    reach = np.empty(len(sample))
     # The points are copied: what lies together is read together.
-    near = np.asarray(xyz[points[order]], np.float64)
+    return _Around(np.asarray(xyz[points[order]], np.float64), table, starts)
+
+
+def _within_cells(
+    xyz: NDArray[np.floating],
+    sample: NDArray[np.float64],
+    k: int,
+    frame: GridFrame,
+    progress: Progress,
+) -> NDArray[np.float64]:
+    """Distance of each sample to its `k` nearest points; nan where beyond a cell's edge."""
+    near, table, starts = _around_cells(xyz, sample, frame, progress)
+    reach = np.empty(len(sample))
     kernels.nearest_in_cells(
         near, sample, frame.numbers, table, np.arange(len(near)), starts, k, reach
     )

@@ -21,7 +21,6 @@ from pipecore.surface import (
     cells_of,
     fit_planes,
     index_type,
-    median_spacing,
 )
 from pipecore.tiling.engine import Engine
 from pipecore.tiling.quantile import quantile
@@ -121,7 +120,7 @@ def downsample_in_slabs(
     if not edge:
         # It looks at the points in passing, chunk by chunk.
         xyz = store.open_coordinates()
-        edge = automatic_voxel(median_spacing(xyz, progress=progress), step)
+        edge = automatic_voxel(xyz, step, progress=progress)
     counted = engine.run(count_planes, [(p, edge) for p in parts], "thinning", progress, (0.3, 0.4))
     planes, which = np.unique(np.concatenate([p for p, _ in counted]), return_inverse=True)
     counts = np.zeros(len(planes), np.int64)

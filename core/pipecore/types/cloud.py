@@ -17,6 +17,7 @@ from pipecore.caller_arrays import (
 from pipecore.display import Summarised
 from pipecore.local_frame import choose_origin, to_local
 from pipecore.notes import Note
+from pipecore.rounding import measured_step, sampled_runs
 from pipecore.types.arrays import Array, Floats
 from pipecore.units import FileUnit
 
@@ -230,6 +231,7 @@ class PointCloud(Summarised):
             station_names=tuple(f"Station {i + 1}" for i in range(n_stations)),
             stations=positions - origin,
             crs=crs,
+            step=measured_step(sampled_runs(world)),
         )
 
     def __len__(self) -> int:

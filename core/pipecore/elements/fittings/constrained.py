@@ -78,7 +78,7 @@ def complete_fitting(
         return None
     covered = min(found.coverage * (found.high - found.low) / axis.length, 1.0)
     extent = Extent(0.0, axis.length, found.arc, covered, found.gaps)
-    misfit = section_misfit(inliers.clock, inliers.residual, extent.arc)
+    misfit = section_misfit(inliers.clock, inliers.residual, extent.arc, nearby.rounding)
     free: SurfaceFit[Any] | None = fit_surface(
         model, nearby.full_resolution(inliers.points)[1], 3.0 * sigma
     )

@@ -370,7 +370,7 @@ def _finished(
     )
     shift -= (shift @ chord.direction)[:, None] * chord.direction
     placed = _shifted(axis, shift)
-    misfit = section_misfit(near.clock, near.residual, extent.arc)
+    misfit = section_misfit(near.clock, near.residual, extent.arc, nearby.rounding)
     low, high = max(extent.low, 0.0), min(extent.high, placed.length)
     gaps = tuple((max(a, low), min(b, high)) for a, b in extent.gaps)
     whole = Extent(0.0, placed.length, extent.arc, extent.coverage, gaps)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pipecore._kernels import axis_rows as kernels
 from pipecore._kernels import misfit as misfit_kernels
+from pipecore.rounding import NO_ROUNDING, Rounding
 
 Array = NDArray[np.float64]
 
@@ -138,13 +139,20 @@ def find_extent(
     )
 
 
-def section_misfit(clock: Array, residual: Array, arc: float) -> float:
+def section_misfit(
+    clock: Array, residual: Array, arc: float, rounding: Rounding = NO_ROUNDING
+) -> float:
     """How far the mean section leaves the shapes that a pipe has, root mean square in metres.
 
     Those shapes are the circle and, on long arcs, the oval. Corners of boxes
-    and the flanges of beams keep a residual in every sector around the axis.
+    and the flanges of beams keep a residual in every sector around the axis. What rounding
+    of the coordinates leaves there is no misfit.
     """
     n_harmonics = 2 if arc > MIN_OVAL_ARC else 1
-    return float(
-        misfit_kernels.section_misfit(clock, residual, MAX_SECTORS, *MIN_IN_SECTOR, n_harmonics)
+    misfit = misfit_kernels.section_misfit(
+        clock, residual, MAX_SECTORS, *MIN_IN_SECTOR, n_harmonics
     )
+    if rounding.step and len(residual):
+        by_rounding = float(rounding.neighbours_sd(float(np.std(residual))))
+        misfit = np.sqrt(max(misfit**2 - by_rounding**2, 0.0))
+    return float(misfit)

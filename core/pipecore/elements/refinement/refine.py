@@ -130,7 +130,7 @@ def _points_on(
         near.inliers, near.chainage, near.clock, near.residual,
         extent.low, extent.high, clear, MIN_POINTS_OFF_ENDS,
     )  # fmt: skip
-    misfit = section_misfit(inlier_clock, inlier_residual, extent.arc)
+    misfit = section_misfit(inlier_clock, inlier_residual, extent.arc, nearby.rounding)
     return _Neighbourhood(near, extent, inliers, chosen, misfit)
 
 
