@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the app; returns its exit code."""
     options = _parser().parse_args(arguments)
+    if options.choose_settings is not None:
+        return _choose_settings(options.choose_settings)
 
     # Qt and VTK take their time: `--help` does without them.
     from PySide6.QtCore import QSettings  # noqa: PLC0415
@@ -74,6 +76,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
 
 
+def _choose_settings(path: Path) -> int:
+    """Show the settings of a file alone; returns 0 if they were kept, else 1."""
+    from PySide6.QtCore import QSettings  # noqa: PLC0415
+    from PySide6.QtWidgets import QApplication  # noqa: PLC0415
+
+    from pipegui.style import theme  # noqa: PLC0415
+
+    app = QApplication.instance() or QApplication(sys.argv[:1])
+    assert isinstance(app, QApplication)
+    app.setApplicationName("PipeGUI")
+    app.setOrganizationName("PipeGUI")
+    _use_language(app, str(QSettings().value("language", "")))
+    theme.apply_theme(app)
+
+    from pipegui.window.settings_window import SettingsWindow  # noqa: PLC0415
+
+    return 0 if SettingsWindow(path).exec() else 1
+
+
 def _use_language(app: "QApplication", chosen: str) -> None:
     """Translate all texts, Qt's own too; numbers keep the decimal point."""
     from PySide6.QtCore import QLibraryInfo, QLocale, QTranslator  # noqa: PLC0415
@@ -105,6 +126,12 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         metavar="PNG",
         help="open, detect, select the worst deformation, save a picture of the window and quit",
+    )
+    parser.add_argument(
+        "--choose-settings",
+        type=Path,
+        metavar="TOML",
+        help="show the settings of a file alone, keep them there and quit",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {pipecore.__version__}")
     return parser
