@@ -57,6 +57,13 @@ SEARCHED = (ElementKind.CYLINDER, ElementKind.CONE, ElementKind.TORUS, ElementKi
 
 NO_REASON = Reason()
 
+SEARCH_OVALITY, FAINT_OVALITIES = 0.02, (0.01, 0.005, 0.0025)
+"""Ovality from which stretches are sought; fainter ones, level by level, between these. The
+setting only says which of them are told: what is found, and as what, does not move with it."""
+
+SEARCH_DEPTH = 0.003
+"""Rings of a crumple are sought from this height on, metres, whatever the setting."""
+
 MIN_DEPTH_SD = 3.0
 """A depth has to be this many times its standard deviation."""
 
@@ -72,6 +79,9 @@ MIN_BOW_LENGTH = 6.0
 
 MAX_OVALITY_SD = 0.01
 """Ovality known less well than to a percentage point is no number for an inspector."""
+
+MAX_STRAIGHTNESS_SD = 0.003
+"""A centre line known less well than this is no number where it shows no bow, metres."""
 
 MIN_EXPLAINED = 0.7
 """A bent pipe is bent in one bow or kink, which explains this share of its line's variation."""
@@ -164,16 +174,23 @@ def find_deformations(
         )
 
     patches, contour = search(KNOT_DIAMETERS)
-    min_ovality = settings.min_ovality_pct / 100
     criteria = ProfileCriteria.of(heights, settings.significance)
-    free = free_oval_stretches(criteria, min_ovality)
-    stretches = _of_both(oval_stretches(contour, min_ovality) if n_terms == 5 else [], free)
+
+    def oval_at(level: float) -> list[OvalStretch]:
+        smooth = oval_stretches(contour, level, settings.significance) if n_terms == 5 else []
+        return _of_both(smooth, free_oval_stretches(criteria, level))
+
+    stretches = oval_at(SEARCH_OVALITY)
     if stretches:
         patches, contour = search(oval_knot_diameters(surface.grid))
-        stretches = _of_both(oval_stretches(contour, min_ovality), free)
-        stretches = [measured_freely(o, criteria) for o in stretches]
-        stretches = [o for o in stretches if o.ovality >= min_ovality]
+        stretches = [measured_freely(o, criteria) for o in oval_at(SEARCH_OVALITY)]
+        stretches = [o for o in stretches if o.ovality >= SEARCH_OVALITY]
         patches = [p for p in patches if not _is_of_ovality(p, stretches, surface.grid)]
+    for level in FAINT_OVALITIES:
+        if settings.min_ovality_pct < 100 * SEARCH_OVALITY:
+            faint = [measured_freely(o, criteria) for o in oval_at(level)]
+            stretches = _of_both(stretches, [o for o in faint if o.ovality >= level])
+    stretches = [o for o in stretches if o.ovality >= settings.min_ovality_pct / 100]
 
     least = settings.min_depth_mm / 1000
     deformations = [
@@ -196,7 +213,8 @@ def find_deformations(
         deformations = [d for d in deformations if not _is_of_kink(d, bow, surface.grid)] + bow
     crumples = [
         describe_crumple(element, surface, contour, c)
-        for c in crumpled_stretches(criteria, heights, least)
+        for c in crumpled_stretches(criteria, heights, SEARCH_DEPTH)
+        if abs(c.height) >= least
     ]
     deformations = merge(deformations, crumples, criteria)
 
@@ -374,12 +392,13 @@ def _measure_bow(
     undented = replace(heights, in_contact=heights.in_contact | ~used)
     line = measure_centre_line(contour, FreeSections.of(undented), element.axis)
     least = max(settings.min_depth_mm / 1000, MIN_BOW_RATIO * grid.length)
-    if line.straightness_sd > settings.min_depth_mm / 1000:
+    is_significant = line.straightness >= settings.significance * line.straightness_sd
+    if line.straightness_sd > MAX_STRAIGHTNESS_SD and not is_significant:
         why = Reason(
             "the centre line is known to ± {sd} mm only", sd=f"{1000 * line.straightness_sd:.0f}"
         )
         return np.nan, why, []
-    if line.straightness < max(least, settings.significance * line.straightness_sd):
+    if line.straightness < least or not is_significant:
         return line.straightness, NO_REASON, []
     hidden = 0.0 if n_terms == 5 else faked_bow(heights)
     if line.straightness < hidden + settings.significance * line.straightness_sd:

@@ -11,8 +11,8 @@ from pipecore.geometry import Array
 MIN_ARC = np.deg2rad(200.0)
 """Below this the second harmonic cannot be separated from a shift of the centre."""
 
-MIN_SIGNIFICANCE = 6.0
-"""A stretch is oval if its ovality is this many times its standard deviation."""
+AMONG_ROWS = 1.1
+"""Factor on the significance of a stretch: its peak is the largest of many rows."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def mean_ovality(contour: Contour) -> tuple[float, float]:
     return float(amplitude * to_ratio), float(np.sqrt(variance) * to_ratio)
 
 
-def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
+def oval_stretches(contour: Contour, min_ovality: float, significance: float) -> list[OvalStretch]:
     """Find the stretches at least one diameter long that are oval.
 
     A stretch continues where the ovality stays above half of `min_ovality`.
@@ -95,6 +95,8 @@ def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
         Fitted with five terms.
     min_ovality : float
         Ratio (Dmax - Dmin) / Dnom that its peak has to reach.
+    significance : float
+        Of the settings: how many standard deviations.
 
     Returns
     -------
@@ -106,7 +108,7 @@ def oval_stretches(contour: Contour, min_ovality: float) -> list[OvalStretch]:
     for first, last in true_ranges((ovality > 0.5 * min_ovality) & (sd < min_ovality)):
         peak = first + int(np.argmax(ovality[first : last + 1]))
         long_enough = (last + 1 - first) * contour.grid.row_size >= 2 * contour.grid.radius
-        is_clear = ovality[peak] > max(MIN_SIGNIFICANCE * sd[peak], min_ovality)
+        is_clear = ovality[peak] > max(AMONG_ROWS * significance * sd[peak], min_ovality)
         if long_enough and is_clear:
             # The strongest value of many reads high: the stretch's upper quarter is its ovality.
             strong = first + np.flatnonzero(
