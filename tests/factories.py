@@ -18,8 +18,10 @@ from pipecore.reasons import Reason
 from pipecore.settings import Settings
 from pipecore.types import (
     OWN_STACK,
+    Correction,
     Deformation,
     DeformationKind,
+    Disagreement,
     Element,
     ElementKind,
     NominalSize,
@@ -27,6 +29,10 @@ from pipecore.types import (
     Profiles,
     Result,
     Stack,
+    Station,
+    StationCheck,
+    StationPair,
+    StationVerdict,
     Verdict,
 )
 
@@ -473,3 +479,31 @@ def make_cloud(n_points: int = 20_000, seed: int = 1) -> PointCloud:
 def make_result(n_points: int = 20_000, seed: int = 1) -> Result:
     """The result of `make_scan`."""
     return make_scan(n_points, seed)[1]
+
+
+def make_station_check() -> StationCheck:
+    """Two stations: the second does not fit, and nothing can be told of it along x."""
+    reason = Reason("It is off by {distance} ± {sd} mm.", distance="4.12", sd="0.10")
+    held = Correction(
+        np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), (),
+        0.0, 0.0, 2, 0.002, StationVerdict.FITS, Reason("It is held."),
+    )  # fmt: skip
+    off = replace(
+        held,
+        pivot=np.array([1.0, 2.0, 0.5]),
+        shift=np.array([np.nan, 4e-3, -1e-3]),
+        shift_sd=np.array([np.nan, 1e-4, 1e-4]),
+        untold=(np.array([1.0, 0.0, 0.0]),),
+        distance=4.12e-3,
+        distance_sd=1e-4,
+        verdict=StationVerdict.DOES_NOT_FIT,
+        reason=reason,
+    )
+    return StationCheck(
+        (
+            Station(1, "east.e57", 1200, np.array([0.0, -4.0, 1.5]), held),
+            Station(2, "west.e57", 800, NAN3, off),
+        ),
+        (StationPair(1, 2, off, 1e-4),),
+        (Disagreement(1, (1, 2), 4.1e-3, 2e-4), Disagreement(3, (1, 2), 15e-3, 1e-3)),
+    )

@@ -33,6 +33,7 @@ from pipecore.settings import (
     StationSource,
     iterate_fields,
 )
+from pipecore.stations.verdicts import TEXTS as STATION_TEXTS
 from pipecore.types import (
     KIND_LABELS,
     Condition,
@@ -96,7 +97,7 @@ def tables() -> Iterator[str]:
     for text in QUESTIONS.values():
         yield from (text.question, text.yes, text.no)
     yield from UNIT_LABELS.values()
-    yield from (*refusals.TEXTS, *ADVICE.values(), OTHERWISE)
+    yield from (*refusals.TEXTS, *ADVICE.values(), OTHERWISE, *STATION_TEXTS)
     yield from (*CAUSES.values(), NO_SENSE, IO_ERROR, "line", "arc")
     yield from (rule.title for rule in list_rules())
     for preset in Presets(Path("none")).every():

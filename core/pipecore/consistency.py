@@ -31,6 +31,8 @@ def check_result(result: Result) -> None:
     for element in result.elements:
         _check_element(element)
     _check_vectors(result.origin)
+    if result.station_check is not None:
+        _check_ids("stations", [s.station_id for s in result.station_check.stations])
     _check_ids("candidates", [c.candidate_id for c in result.candidates])
     for candidate in result.candidates:
         numbers = (candidate.axis.length, candidate.radius, candidate.radius_end)

@@ -37,6 +37,7 @@ GROUP_TITLES = {
     "ellipses": mark("Ellipses"),
     "elements": mark("Elements"),
     "deformation": mark("Deformations"),
+    "stations": mark("Stations"),
 }
 LARGEST = 1e6
 

@@ -17,7 +17,7 @@ from pipecore.cli.parser import given_settings
 from pipecore.errors import WriteError
 from pipecore.formatting import format_clock, format_measure
 from pipecore.pipeline import detect
-from pipecore.report import by_verdict, summarise, write_report
+from pipecore.report import by_verdict, station_sentence, summarise, write_report
 from pipecore.rules import depth_pct_od, load_rules, verdict_words
 from pipecore.settings import Settings
 from pipecore.tiling import GIB, detect_in_tiles, estimate_need
@@ -50,6 +50,8 @@ def run(args: argparse.Namespace, console: Console) -> None:
     console.say(f"{summarise(result)}.")
     for line in deformation_lines(result):
         console.say(line)
+    if result.station_check is not None:
+        console.say(station_sentence(result.station_check))
     n_candidates = len(result.candidates) + result.n_more_candidates
     if n_candidates:
         were = "was" if n_candidates == 1 else "were"

@@ -26,6 +26,8 @@ from pipecore.progress import NoProgress, Progress, Renamed
 from pipecore.report.loading import load
 from pipecore.report.reading import result_from_dict
 from pipecore.report.result_json import result_to_dict, write_result_json
+from pipecore.report.station_page import station_sentence
+from pipecore.report.stations import pairs_table, stations_table
 from pipecore.report.summary import by_verdict, summarise
 from pipecore.report.tables import (
     NOT_REVIEWED,
@@ -47,9 +49,12 @@ __all__ = [
     "deformations_table",
     "elements_table",
     "load",
+    "pairs_table",
     "profiles_table",
     "result_from_dict",
     "result_to_dict",
+    "station_sentence",
+    "stations_table",
     "summarise",
     "write_deformation_mesh",
     "write_deformations_csv",
@@ -76,7 +81,8 @@ def write_report(
 
     It holds ``elements.csv``, ``profiles.csv``, ``deformations.csv``, ``candidates.csv``,
     ``result.json``, ``segments.laz``, ``report.html`` and ``settings.toml``, and
-    ``deformations.ply`` if the settings ask for a mesh.
+    ``deformations.ply`` if the settings ask for a mesh; ``stations.csv`` and ``pairs.csv`` if
+    the cloud is of several stations.
 
     Parameters
     ----------
@@ -122,6 +128,9 @@ def write_report(
         write_elements_csv(folder / "elements.csv", result, cloud)
         write_deformations_csv(folder / "deformations.csv", result, reviews)
         write_csv(folder / "candidates.csv", candidates_table(result))
+        if result.station_check is not None:
+            write_csv(folder / "stations.csv", stations_table(result))
+            write_csv(folder / "pairs.csv", pairs_table(result))
         write_profiles_csv(folder / "profiles.csv", result, progress)
         write_result_json(folder / "result.json", result, progress)
         if cloud is None:

@@ -1,7 +1,6 @@
 """``report.html``: the result on one page that needs no other file, to read and to print."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -21,6 +20,8 @@ from pipecore.formatting import (
 )
 from pipecore.geometry import ArcAxis
 from pipecore.progress import NoProgress, Progress
+from pipecore.report.page_tables import PageColumn
+from pipecore.report.station_page import stations_of_page
 from pipecore.report.summary import VERDICT_ORDER, by_verdict, summarise
 from pipecore.report.world import FileCoordinates
 from pipecore.resources import resource
@@ -45,14 +46,6 @@ from pipecore.types import (
 
 POINTS_AT_ONCE = 10_000_000
 """Points of elements whose rows are held at a time."""
-
-
-@dataclass(frozen=True)
-class PageColumn:
-    """A column of a table on the page."""
-
-    title: str
-    numeric: bool = True
 
 
 def render_html(cloud: PointCloud, result: Result, progress: Progress | None = None) -> str:
@@ -82,6 +75,7 @@ def render_html(cloud: PointCloud, result: Result, progress: Progress | None = N
         elements=_element_table(result),
         candidates=_candidate_table(result, place),
         n_more_candidates=result.n_more_candidates,
+        stations=stations_of_page(result),
         notes=[str(note) for note in result.notes if note not in cloud.notes],
         has_strain=any(np.isfinite(d.strain) for d in result.deformations),
         wall_thickness=f"{result.settings.deformation.wall_thickness_mm:g} mm",

@@ -17,7 +17,16 @@ from pipecore.progress import Progress
 from pipecore.reasons import Reason
 from pipecore.report.result_json import FORMAT, FORMAT_VERSION
 from pipecore.settings import Settings
-from pipecore.types import Array, Candidate, Deformation, Element, Profiles, Result, Stack
+from pipecore.types import (
+    Array,
+    Candidate,
+    Deformation,
+    Element,
+    Profiles,
+    Result,
+    Stack,
+    StationCheck,
+)
 from pipecore.units import FileUnit
 
 POINT_COLUMNS = {"segment_id": np.int32, "element_id": np.int32, "deviation_mm": np.float32}
@@ -147,7 +156,23 @@ def result_from_dict(plain: Mapping[str, Any]) -> Result:
             ],
         ),
         n_more_candidates=from_plain(int, plain.get("n_more_candidates", 0)),
+        station_check=_station_check(plain.get("station_check"), templates),
     )
+
+
+def _station_check(plain: Any, templates: Mapping[str, Any]) -> StationCheck | None:
+    """How stations fit, with reasons that have their templates again."""
+    if plain is None:
+        return None
+
+    def filled(item: Mapping[str, Any]) -> dict[str, Any]:
+        reason = item["correction"]["reason"]
+        correction = {**item["correction"], "reason": templates.get(reason, reason)}
+        return {**item, "correction": correction}
+
+    lists = {name: [filled(item) for item in plain[name]] for name in ("stations", "pairs")}
+    found: StationCheck = from_plain(StationCheck, {**plain, **lists})
+    return found
 
 
 def _unit(plain: Mapping[str, Any]) -> FileUnit:

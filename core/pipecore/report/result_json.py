@@ -10,7 +10,7 @@ centre, normal, towards_start, bend_radius and bend_angle,
 length, with nine digits after the point. ``settings`` are those of the detection,
 ``own_settings`` those of elements that were detected again with others, by element id.
 ``templates`` gives the sentences of ``notes``, ``not_measurable``, ``verdict_reason`` and
-``reason`` (of ``candidates``, what was nearly accepted)
+``reason`` (of ``candidates``, what was nearly accepted, and of corrections in ``station_check``)
 that have values in them as template and values, so that they can be said in another
 language. A reader refuses a larger `format_version`; keys may be added within a version.
 """
@@ -85,6 +85,7 @@ def _content(result: Result) -> dict[str, Any]:
         "deformations": _plain(result.deformations),
         "candidates": _plain(result.candidates),
         "n_more_candidates": result.n_more_candidates,
+        "station_check": _plain(result.station_check),
         "templates": _templates(result),
     }
 
@@ -95,6 +96,9 @@ def _templates(result: Result) -> dict[str, Any]:
     reasons = [why for items in found for item in items for why in item.not_measurable.values()]
     reasons += [d.verdict_reason for d in result.deformations]
     reasons += [c.reason for c in result.candidates]
+    if (check := result.station_check) is not None:
+        reasons += [s.correction.reason for s in check.stations]
+        reasons += [p.correction.reason for p in check.pairs]
     return {
         str(sentence): {"template": sentence.template, "values": _plain(sentence.values)}
         for sentence in [*result.notes, *reasons]

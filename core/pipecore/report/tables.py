@@ -8,25 +8,25 @@ input file. Columns may be added; these keep name and meaning.
 import csv
 import io
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pipecore.formatting import format_clock, text_cell
 from pipecore.geometry import ArcAxis
 from pipecore.inspection.section import radius_is_measurable
 from pipecore.io import write_file
 from pipecore.progress import NoProgress, Progress, in_chunks
+from pipecore.report.columns import angles, floats, integers, positions, texts
 from pipecore.report.world import FileCoordinates
 from pipecore.rules import depth_pct_od
 from pipecore.table import Table
 from pipecore.types import (
     Answers,
-    Array,
     DeformationKind,
     ElementKind,
     NominalSize,
@@ -42,8 +42,6 @@ FEWEST_SEEN = 0.01
 NOT_REVIEWED: Mapping[int, Review] = MappingProxyType({})
 BLANK_WHERE_ZERO = {"fitting_id", "next_id"}
 """Columns of ids that may be of nothing: 0 in a table, empty in a file."""
-
-Column = tuple[str, NDArray[Any], int | None]
 
 
 def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
@@ -72,40 +70,40 @@ def elements_table(result: Result, cloud: PointCloud | None = None) -> Table:
     run_names = [result.run_names.get(e.run_id, "") for e in elements]
     return Table(
         [
-            _integers("element_id", [e.element_id for e in elements]),
-            _integers("run_id", [e.run_id for e in elements]),
-            _texts("kind", [str(e.kind) for e in elements]),
-            _floats("radius_mm", [e.radius for e in elements], 1e3, 2),
-            _floats("radius_sd_mm", [e.radius_sd for e in elements], 1e3, 3),
-            _floats("radius_end_mm", cone_ends, 1e3, 2),
-            _texts("nominal_size", [_name(n) for n in nominal]),
-            _floats("nominal_od_mm", nominal_ods, 1e3, 2),
-            _floats("bend_radius_mm", [b.bend_radius if b else np.nan for b in bends], 1e3, 2),
-            _angles("bend_angle_deg", [b.bend_angle if b else np.nan for b in bends]),
-            _floats("length_m", [e.axis.length for e in elements], 1, 4),
-            *_positions("start", [e.axis.start for e in elements], place),
-            *_positions("end", [e.axis.end for e in elements], place),
-            *_positions("centre", [e.centre for e in elements], place),
-            _integers("n_points", [e.n_points for e in elements]),
-            _integers("n_profiles", [e.n_profiles for e in elements]),
-            _angles("arc_deg", [e.arc for e in elements]),
-            _floats("rms_mm", [e.rms for e in elements], 1e3, 3),
-            _floats("ovality_pct", [e.ovality for e in elements], 100, 3),
-            _floats("ovality_sd_pct", [e.ovality_sd for e in elements], 100, 3),
-            _floats("straightness_mm", [e.straightness for e in elements], 1e3, 2),
-            _integers("n_deformations", n_deformations),
-            _integers("n_gaps", [len(e.gaps) for e in elements]),
-            _floats("gaps_m", gap_lengths, 1, 4),
-            _texts("not_measurable", reasons),
-            _texts("name", [e.name for e in elements]),
-            _texts("run_name", run_names),
-            _texts("stations", _stations(result, cloud)),
-            _texts("nominal_size_end", [_name(e.nominal_end) for e in elements]),
-            _texts("nominal_catalogue", [n.catalogue if n else "" for n in nominal]),
-            _texts("other_nominal_size", [_name(e.other_nominal) for e in elements]),
-            _texts("clad", ["yes" if e.is_clad else "" for e in elements]),
-            _texts("answers", [_answers(e.answers) for e in elements]),
-            _texts("accepted_by", [e.accepted_by for e in elements]),
+            integers("element_id", [e.element_id for e in elements]),
+            integers("run_id", [e.run_id for e in elements]),
+            texts("kind", [str(e.kind) for e in elements]),
+            floats("radius_mm", [e.radius for e in elements], 1e3, 2),
+            floats("radius_sd_mm", [e.radius_sd for e in elements], 1e3, 3),
+            floats("radius_end_mm", cone_ends, 1e3, 2),
+            texts("nominal_size", [_name(n) for n in nominal]),
+            floats("nominal_od_mm", nominal_ods, 1e3, 2),
+            floats("bend_radius_mm", [b.bend_radius if b else np.nan for b in bends], 1e3, 2),
+            angles("bend_angle_deg", [b.bend_angle if b else np.nan for b in bends]),
+            floats("length_m", [e.axis.length for e in elements], 1, 4),
+            *positions("start", [e.axis.start for e in elements], place),
+            *positions("end", [e.axis.end for e in elements], place),
+            *positions("centre", [e.centre for e in elements], place),
+            integers("n_points", [e.n_points for e in elements]),
+            integers("n_profiles", [e.n_profiles for e in elements]),
+            angles("arc_deg", [e.arc for e in elements]),
+            floats("rms_mm", [e.rms for e in elements], 1e3, 3),
+            floats("ovality_pct", [e.ovality for e in elements], 100, 3),
+            floats("ovality_sd_pct", [e.ovality_sd for e in elements], 100, 3),
+            floats("straightness_mm", [e.straightness for e in elements], 1e3, 2),
+            integers("n_deformations", n_deformations),
+            integers("n_gaps", [len(e.gaps) for e in elements]),
+            floats("gaps_m", gap_lengths, 1, 4),
+            texts("not_measurable", reasons),
+            texts("name", [e.name for e in elements]),
+            texts("run_name", run_names),
+            texts("stations", _stations(result, cloud)),
+            texts("nominal_size_end", [_name(e.nominal_end) for e in elements]),
+            texts("nominal_catalogue", [n.catalogue if n else "" for n in nominal]),
+            texts("other_nominal_size", [_name(e.other_nominal) for e in elements]),
+            texts("clad", ["yes" if e.is_clad else "" for e in elements]),
+            texts("answers", [_answers(e.answers) for e in elements]),
+            texts("accepted_by", [e.accepted_by for e in elements]),
         ]
     )
 
@@ -151,27 +149,27 @@ def profiles_table(result: Result) -> Table:
     )
     return Table(
         [
-            _integers("element_id", p.element_id),
-            _integers("stack_id", p.stack_id),
-            _integers("profile_index", p.profile_index),
-            _floats("chainage_m", p.chainage, 1, 4),
-            *_positions("centre", p.centre, FileCoordinates.of(result)),
-            _floats("semi_minor_mm", p.semi_minor, 1e3, 2),
-            _floats("semi_major_mm", p.semi_major, 1e3, 2),
-            _floats("flattening", p.flattening, 1, 5),
-            _floats("radius_mm", radius, 1e3, 2),
-            _floats("radius_sd_mm", radius_sd, 1e3, 3),
-            _floats("ovality_pct", p.ovality, 100, 3),
-            _floats("centre_deviation_mm", p.centre_deviation, 1e3, 2),
-            _floats("radius_deviation_mm", radius_deviation, 1e3, 2),
-            _angles("arc_deg", p.arc),
-            _integers("n_points", p.n_points),
-            _floats("rms_mm", p.rms, 1e3, 3),
-            _floats("aic_line", p.aic_line, 1, 2),
-            _floats("aic_ellipse", p.aic_ellipse, 1, 2),
-            _floats("semi_minor_sd_mm", p.semi_minor_sd, 1e3, 3),
-            _floats("semi_minor_drop_mm", p.minor_drop, 1e3, 2),
-            _floats("curvature_variation", p.curvature_variation, 1, 3),
+            integers("element_id", p.element_id),
+            integers("stack_id", p.stack_id),
+            integers("profile_index", p.profile_index),
+            floats("chainage_m", p.chainage, 1, 4),
+            *positions("centre", p.centre, FileCoordinates.of(result)),
+            floats("semi_minor_mm", p.semi_minor, 1e3, 2),
+            floats("semi_major_mm", p.semi_major, 1e3, 2),
+            floats("flattening", p.flattening, 1, 5),
+            floats("radius_mm", radius, 1e3, 2),
+            floats("radius_sd_mm", radius_sd, 1e3, 3),
+            floats("ovality_pct", p.ovality, 100, 3),
+            floats("centre_deviation_mm", p.centre_deviation, 1e3, 2),
+            floats("radius_deviation_mm", radius_deviation, 1e3, 2),
+            angles("arc_deg", p.arc),
+            integers("n_points", p.n_points),
+            floats("rms_mm", p.rms, 1e3, 3),
+            floats("aic_line", p.aic_line, 1, 2),
+            floats("aic_ellipse", p.aic_ellipse, 1, 2),
+            floats("semi_minor_sd_mm", p.semi_minor_sd, 1e3, 3),
+            floats("semi_minor_drop_mm", p.minor_drop, 1e3, 2),
+            floats("curvature_variation", p.curvature_variation, 1, 3),
         ]
     )
 
@@ -192,19 +190,19 @@ def candidates_table(result: Result) -> Table:
     found = result.candidates
     return Table(
         [
-            _integers("candidate_id", [c.candidate_id for c in found]),
-            _texts("kind", [str(c.kind) for c in found]),
-            _floats("radius_mm", [c.radius for c in found], 1e3, 2),
-            _floats("radius_sd_mm", [c.radius_sd for c in found], 1e3, 3),
-            _floats("length_m", [c.axis.length for c in found], 1, 4),
-            _angles("arc_deg", [c.arc for c in found]),
-            _integers("n_points", [c.n_points for c in found]),
-            *_positions("start", [c.axis.start for c in found], place),
-            *_positions("end", [c.axis.end for c in found], place),
-            _texts("reason", [str(c.reason) for c in found]),
-            _floats("value", [c.value for c in found], 1, 3),
-            _floats("limit", [c.limit for c in found], 1, 3),
-            _texts("unit", [c.unit for c in found]),
+            integers("candidate_id", [c.candidate_id for c in found]),
+            texts("kind", [str(c.kind) for c in found]),
+            floats("radius_mm", [c.radius for c in found], 1e3, 2),
+            floats("radius_sd_mm", [c.radius_sd for c in found], 1e3, 3),
+            floats("length_m", [c.axis.length for c in found], 1, 4),
+            angles("arc_deg", [c.arc for c in found]),
+            integers("n_points", [c.n_points for c in found]),
+            *positions("start", [c.axis.start for c in found], place),
+            *positions("end", [c.axis.end for c in found], place),
+            texts("reason", [str(c.reason) for c in found]),
+            floats("value", [c.value for c in found], 1, 3),
+            floats("limit", [c.limit for c in found], 1, 3),
+            texts("unit", [c.unit for c in found]),
         ]
     )
 
@@ -236,68 +234,43 @@ def deformations_table(result: Result, reviews: Mapping[int, Review] = NOT_REVIE
     interacts = [("yes" if d.interacts else "no") if d.next_id else "" for d in found]
     return Table(
         [
-            _integers("deformation_id", [d.deformation_id for d in found]),
-            _integers("element_id", [d.element_id for d in found]),
-            _texts("kind", [str(d.kind) for d in found]),
-            _floats("chainage_m", [d.chainage for d in found], 1, 4),
-            _floats("chainage_start_m", [d.chainage_start for d in found], 1, 4),
-            _floats("chainage_end_m", [d.chainage_end for d in found], 1, 4),
-            _texts("clock", [format_clock(d.clock) for d in found]),
-            *_positions("peak", [d.peak for d in found], place),
-            _floats("depth_mm", depths, 1e3, 2),
-            _floats("depth_sd_mm", depth_sds, 1e3, 3),
-            _floats("depth_pct_od", shares, 1, 3),
-            _floats("length_mm", [d.length for d in found], 1e3, 2),
-            _floats("width_mm", [d.width for d in found], 1e3, 2),
-            _floats("ovality_pct", [d.ovality for d in found], 100, 3),
-            _floats("strain_pct", [d.strain for d in found], 100, 3),
-            _integers("n_points", [d.n_points for d in found]),
-            _texts("rule", [d.rule for d in found]),
-            _texts("verdict", [str(d.verdict) for d in found]),
-            _floats("area_mm2", [d.area for d in found], 1e6, 0),
-            _floats("volume_mm3", [d.volume for d in found], 1e9, 0),
-            _integers("fitting_id", [d.fitting_id for d in found]),
-            _floats("fitting_distance_m", [d.fitting_distance for d in found], 1, 4),
-            _integers("next_id", [d.next_id for d in found]),
-            _floats("next_distance_m", [d.next_distance for d in found], 1, 4),
-            _texts("interacts", interacts),
-            _texts("seen_by", ["+".join(d.seen_by) for d in found]),
-            _floats("dmax_mm", [d.dmax for d in found], 1e3, 2),
-            _floats("dmin_mm", [d.dmin for d in found], 1e3, 2),
-            _texts("not_measurable", [_reasons(d.not_measurable) for d in found]),
-            _texts("review", [str(review.state) for review in said]),
-            _texts("comment", [" ".join(review.comment.split()) for review in said]),
-            _texts("condition", [str(d.condition or "") for d in found]),
-            _texts("open_questions", ["+".join(d.open_questions) for d in found]),
-            _texts("verdict_reason", [str(d.verdict_reason) for d in found]),
-            _texts("answers", [_answers(d.answers) for d in found]),
+            integers("deformation_id", [d.deformation_id for d in found]),
+            integers("element_id", [d.element_id for d in found]),
+            texts("kind", [str(d.kind) for d in found]),
+            floats("chainage_m", [d.chainage for d in found], 1, 4),
+            floats("chainage_start_m", [d.chainage_start for d in found], 1, 4),
+            floats("chainage_end_m", [d.chainage_end for d in found], 1, 4),
+            texts("clock", [format_clock(d.clock) for d in found]),
+            *positions("peak", [d.peak for d in found], place),
+            floats("depth_mm", depths, 1e3, 2),
+            floats("depth_sd_mm", depth_sds, 1e3, 3),
+            floats("depth_pct_od", shares, 1, 3),
+            floats("length_mm", [d.length for d in found], 1e3, 2),
+            floats("width_mm", [d.width for d in found], 1e3, 2),
+            floats("ovality_pct", [d.ovality for d in found], 100, 3),
+            floats("strain_pct", [d.strain for d in found], 100, 3),
+            integers("n_points", [d.n_points for d in found]),
+            texts("rule", [d.rule for d in found]),
+            texts("verdict", [str(d.verdict) for d in found]),
+            floats("area_mm2", [d.area for d in found], 1e6, 0),
+            floats("volume_mm3", [d.volume for d in found], 1e9, 0),
+            integers("fitting_id", [d.fitting_id for d in found]),
+            floats("fitting_distance_m", [d.fitting_distance for d in found], 1, 4),
+            integers("next_id", [d.next_id for d in found]),
+            floats("next_distance_m", [d.next_distance for d in found], 1, 4),
+            texts("interacts", interacts),
+            texts("seen_by", ["+".join(d.seen_by) for d in found]),
+            floats("dmax_mm", [d.dmax for d in found], 1e3, 2),
+            floats("dmin_mm", [d.dmin for d in found], 1e3, 2),
+            texts("not_measurable", [_reasons(d.not_measurable) for d in found]),
+            texts("review", [str(review.state) for review in said]),
+            texts("comment", [" ".join(review.comment.split()) for review in said]),
+            texts("condition", [str(d.condition or "") for d in found]),
+            texts("open_questions", ["+".join(d.open_questions) for d in found]),
+            texts("verdict_reason", [str(d.verdict_reason) for d in found]),
+            texts("answers", [_answers(d.answers) for d in found]),
         ]
     )
-
-
-def _integers(name: str, values: ArrayLike) -> Column:
-    return name, np.array(values, np.int32), None
-
-
-def _texts(name: str, values: Sequence[str]) -> Column:
-    return name, np.array(values, object), None
-
-
-def _floats(name: str, values: ArrayLike, scale: float, decimals: int) -> Column:
-    """A column in the unit of its name, rounded as its file has it; nan for what is none."""
-    # Adding zero takes the sign off a zero.
-    rounded = np.round(scale * np.asarray(values, np.float64), decimals) + 0.0
-    return name, np.where(np.isfinite(rounded), rounded, np.nan), decimals
-
-
-def _angles(name: str, radians: ArrayLike) -> Column:
-    return _floats(name, np.rad2deg(np.asarray(radians, np.float64)), 1, 2)
-
-
-def _positions(name: str, local: ArrayLike, place: FileCoordinates) -> Iterator[Column]:
-    points: Array = place.of_local(np.asarray(local, np.float64).reshape(-1, 3))
-    for i, axis in enumerate("xyz"):
-        yield _floats(f"{name}_{axis}", points[:, i], 1, place.decimals)
 
 
 def _name(size: NominalSize | None) -> str:

@@ -30,6 +30,7 @@ from pipecore.settings.groups import (
     ProfileSettings,
     SizeCatalogue,
     StackSettings,
+    StationSettings,
     StationSource,
     ThinningSettings,
     TilingSettings,
@@ -51,6 +52,7 @@ __all__ = [
     "Settings",
     "SizeCatalogue",
     "StackSettings",
+    "StationSettings",
     "StationSource",
     "ThinningSettings",
     "TilingSettings",
@@ -86,6 +88,7 @@ class Settings(Summarised):
     ellipses : EllipseSettings
     elements : ElementSettings
     deformation : DeformationSettings
+    stations : StationSettings
     tiling : TilingSettings
 
     Raises
@@ -102,6 +105,7 @@ class Settings(Summarised):
     ellipses: EllipseSettings = EllipseSettings()
     elements: ElementSettings = ElementSettings()
     deformation: DeformationSettings = DeformationSettings()
+    stations: StationSettings = StationSettings()
     tiling: TilingSettings = TilingSettings()
 
     def __post_init__(self) -> None:

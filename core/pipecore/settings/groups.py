@@ -301,6 +301,20 @@ class DeformationSettings(Group, name="deformation"):
 
 
 @dataclass(frozen=True)
+class StationSettings(Group, name="stations"):
+    """Whether the stations of a scan fit together, as its pipes tell."""
+
+    tolerance_mm: float = setting(
+        2.0,
+        "Stations fit within",
+        "A station whose points lie off those of the others by more, and surely so, does not fit.",
+        unit="mm",
+        minimum=0.1,
+        maximum=100.0,
+    )
+
+
+@dataclass(frozen=True)
 class TilingSettings(Group, name="tiling"):
     """Scans that do not fit into memory."""
 

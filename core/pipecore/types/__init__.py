@@ -27,6 +27,14 @@ from pipecore.types.judgement import Answers, Condition, Question, Verdict
 from pipecore.types.profiles import Profiles
 from pipecore.types.result import Result
 from pipecore.types.stack import OWN_STACK, Stack
+from pipecore.types.stations import (
+    Correction,
+    Disagreement,
+    Station,
+    StationCheck,
+    StationPair,
+    StationVerdict,
+)
 
 __all__ = [
     "KIND_LABELS",
@@ -36,8 +44,10 @@ __all__ = [
     "Array",
     "Candidate",
     "Condition",
+    "Correction",
     "Deformation",
     "DeformationKind",
+    "Disagreement",
     "Element",
     "ElementKind",
     "Field",
@@ -52,6 +62,10 @@ __all__ = [
     "ReviewState",
     "SeenBy",
     "Stack",
+    "Station",
+    "StationCheck",
+    "StationPair",
+    "StationVerdict",
     "Storage",
     "SurfaceOfRevolution",
     "Verdict",

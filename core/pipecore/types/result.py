@@ -22,6 +22,7 @@ from pipecore.types.element import KIND_LABELS, Element
 from pipecore.types.ids import find_by_id
 from pipecore.types.profiles import Profiles
 from pipecore.types.stack import Stack
+from pipecore.types.stations import StationCheck
 from pipecore.units import FileUnit
 
 
@@ -69,6 +70,8 @@ class Result(Summarised):
         dismisses leave it.
     n_more_candidates : int
         How many more there were, which are not kept.
+    station_check : StationCheck, optional
+        How the stations fit together; None where only one is known.
     """
 
     settings: Settings
@@ -90,6 +93,7 @@ class Result(Summarised):
     notes: tuple[Note, ...] = ()
     candidates: tuple[Candidate, ...] = ()
     n_more_candidates: int = 0
+    station_check: StationCheck | None = None
 
     @property
     def file_unit(self) -> FileUnit:
@@ -213,6 +217,15 @@ class Result(Summarised):
         Table
         """
         return pipecore.report.candidates_table(self)
+
+    def stations_table(self) -> Table:
+        """Return how the stations fit together as ``stations.csv`` has it.
+
+        Returns
+        -------
+        Table
+        """
+        return pipecore.report.stations_table(self)
 
     def save(
         self,

@@ -23,7 +23,7 @@ from pipecore.report import deformations_table, result_from_dict, result_to_dict
 from pipecore.settings import Settings
 from pipecore.types import NominalSize, Profiles, Result, Review, ReviewState
 from pipecore.units import FileUnit
-from tests.factories import make_scan
+from tests.factories import make_scan, make_station_check
 
 N_POINTS = 2000
 NANOMETRE = 1e-9
@@ -48,6 +48,7 @@ def edited() -> Result:
         own_settings={4: Settings().replace({"stacks.width_mm": 12})},
         unit=FileUnit("us-ft", 1200 / 3937, "m", 1.0),
         notes=(Note("“{name}” has {n:,} points.", name="a.las", n=2000), Note("It is {old}.")),
+        station_check=make_station_check(),
     )
 
 
@@ -108,9 +109,11 @@ def test_that_a_result_saves_without_its_cloud(edited: Result, tmp_path: Path) -
         "candidates.csv",
         "deformations.csv",
         "elements.csv",
+        "pairs.csv",
         "profiles.csv",
         "result.json",
         "settings.toml",
+        "stations.csv",
     ]
     assert len(pipecore.load(folder).elements) == len(edited.elements)
     with pytest.raises(WriteError, match="not empty"):
