@@ -6,9 +6,11 @@ from PySide6.QtWidgets import QWidget
 
 import pipecore
 from pipecore.errors import PipecoreError
+from pipecore.notes import Note
 from pipecore.settings import Settings
 from pipegui.controllers import file_dialogs
 from pipegui.controllers.session import Session
+from pipegui.i18n.reason_texts import reason_text
 from pipegui.i18n.texts import error_text, tr
 from pipegui.model import commands
 
@@ -25,7 +27,10 @@ class SettingsFiles:
         if path is None:
             return
         try:
-            self._session.do(commands.load_settings, Settings.from_toml(path))
+            notes: list[Note] = []
+            self._session.do(commands.load_settings, Settings.from_toml(path, notes.append))
+            for note in notes:
+                self._session.show_message(reason_text(note), "warning")
         except PipecoreError as error:
             self._session.show_message(error_text(error), "error")
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from pipecore.errors import SettingsError
 from pipecore.settings import (
+    SCHEDULER,
     DeformationSettings,
     DirectionPreset,
     LengthUnit,
@@ -60,7 +61,7 @@ def test_that_settings_survive_a_toml_file(
 ) -> None:
     path = tmp_path_factory.mktemp("settings") / "settings.toml"
     path.write_text(settings.to_toml(), encoding="utf-8")
-    assert Settings.from_toml(path) == settings
+    assert Settings.from_toml(path) == settings.replace({SCHEDULER: ""})
 
 
 @given(any_settings)
@@ -242,3 +243,32 @@ def test_that_survey_feet_and_feet_differ_by_two_parts_in_a_million() -> None:
     assert ratio - 1 == pytest.approx(2e-6, rel=1e-3)
     assert LengthUnit.FOOT.metres == pytest.approx(12 * 0.0254)
     assert LengthUnit.MILLIMETRE.metres * 1000 == LengthUnit.METRE.metres
+
+
+class TestClusterAddress:
+    """Whoever answers at it runs code here: no file may name one."""
+
+    def test_that_a_settings_file_names_one_in_vain_and_is_told_off(self, tmp_path):
+        path = tmp_path / "settings.toml"
+        path.write_text(
+            '[tiling]\nscheduler = "tcp://203.0.113.7:8786"\n[elements]\nmin_radius_mm = 40\n'
+        )
+        notes = []
+        settings = Settings.from_toml(path, notes.append)
+        assert settings == Settings().replace({"elements.min_radius_mm": 40})
+        [note] = notes
+        assert "names a dask scheduler, which is ignored" in str(note)
+
+    def test_that_what_older_versions_wrote_says_nothing(self, tmp_path):
+        path = tmp_path / "settings.toml"
+        path.write_text('[tiling]\nscheduler = ""\n')
+        notes = []
+        assert Settings.from_toml(path, notes.append) == Settings()
+        assert notes == []
+
+    def test_that_one_that_was_typed_is_not_written(self):
+        typed = Settings().replace({"tiling.scheduler": "tcp://10.0.0.5:8786"})
+        assert typed.tiling.scheduler
+        assert "10.0.0.5" not in typed.to_toml()
+        named = {"tiling": {"scheduler": "tcp://10.0.0.5:8786"}}
+        assert Settings.from_dict(named) == Settings()

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import os
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,14 +20,21 @@ from pipecore.formatting import format_clock, format_measure
 from pipecore.pipeline import detect
 from pipecore.report import by_verdict, station_sentence, summarise, write_report
 from pipecore.rules import depth_pct_od, load_rules, verdict_words
-from pipecore.settings import Settings
+from pipecore.settings import SCHEDULER, Settings
 from pipecore.tiling import GIB, detect_in_tiles, estimate_need
 from pipecore.types import PointCloud, Result
+
+SCHEDULER_VARIABLE = "PIPECORE_SCHEDULER"
+"""Environment variable that names the dask scheduler, where no flag does."""
 
 
 def run(args: argparse.Namespace, console: Console) -> None:
     """Read, detect, write the report, and say what was found."""
-    settings = Settings.from_toml(args.settings) if args.settings else Settings()
+    settings = Settings()
+    if args.settings:
+        settings = Settings.from_toml(args.settings, lambda note: console.warn([note]))
+    if address := os.environ.get(SCHEDULER_VARIABLE):
+        settings = settings.replace({SCHEDULER: address})
     settings = settings.replace(given_settings(args))
     # What would fail at the end fails now.
     load_rules(settings.deformation.rule)

@@ -6,7 +6,7 @@ line, the TOML file and the app's form are generated from it.
 
 import dataclasses
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,6 +16,7 @@ import tomli_w
 
 from pipecore.display import Summarised
 from pipecore.errors import SettingsError
+from pipecore.notes import Note
 from pipecore.settings.fields import FieldSpec, Group, choices_of, convert, specs_of
 from pipecore.settings.groups import (
     DeformationSettings,
@@ -38,6 +39,7 @@ from pipecore.settings.groups import (
 
 __all__ = [
     "JUDGING_KEYS",
+    "SCHEDULER",
     "DeformationSettings",
     "DirectionPreset",
     "ElementSettings",
@@ -60,6 +62,9 @@ __all__ = [
     "iterate_fields",
 ]
 
+
+SCHEDULER = "tiling.scheduler"
+"""The key of the address of a cluster, which no file may set."""
 
 JUDGING_KEYS = (
     "deformation.rule",
@@ -180,6 +185,7 @@ class Settings(Summarised):
         Returns
         -------
         dict
+            Without the address of a cluster, see `from_dict`.
         """
         result: dict[str, dict[str, Any]] = {}
         for key, spec in iterate_fields():
@@ -190,11 +196,15 @@ class Settings(Summarised):
             elif isinstance(value, tuple):
                 value = [list(v) for v in value]
             result.setdefault(group, {})[name] = str(value) if isinstance(value, StrEnum) else value
+        result["tiling"]["scheduler"] = ""
         return result
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> "Settings":
         """Return settings from nested dicts; what is absent keeps its default.
+
+        The address of a cluster is left out: who answers there runs code on this computer, so
+        that no file may name one, only a person.
 
         Parameters
         ----------
@@ -215,6 +225,7 @@ class Settings(Summarised):
             if not isinstance(values, Mapping):
                 raise SettingsError("“{group}” is not a group of settings.", group=group)
             changes.update({f"{group}.{name}": value for name, value in values.items()})
+        changes.pop(SCHEDULER, None)
         return cls().replace(changes)
 
     def to_toml(self) -> str:
@@ -227,12 +238,16 @@ class Settings(Summarised):
         return tomli_w.dumps(self.to_dict())
 
     @classmethod
-    def from_toml(cls, path: Path) -> "Settings":
+    def from_toml(
+        cls, path: Path, warn: Callable[[Note], object] = lambda note: None
+    ) -> "Settings":
         """Read settings from a TOML file.
 
         Parameters
         ----------
         path : Path
+        warn : callable
+            Called with what was not taken from it: the address of a cluster, see `from_dict`.
 
         Returns
         -------
@@ -249,6 +264,16 @@ class Settings(Summarised):
             raise SettingsError(
                 "Cannot read the settings file {path}: {error}.", path=path, error=error
             ) from error
+        group, name = SCHEDULER.split(".")
+        named = data.get(group)
+        if isinstance(named, Mapping) and named.get(name):
+            warn(
+                Note(
+                    "“{path}” names a dask scheduler, which is ignored: whoever answers there runs "
+                    "code on this computer. Give it with --tiling-scheduler if you trust it.",
+                    path=path,
+                )
+            )
         try:
             return cls.from_dict(data)
         except SettingsError as error:
